@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Records the moving picture of the README: frames of the page in a Chromium, one for every 50 ticks.
 
-    cargo xtask demo --touch --out target/page
+    cargo xtask demo --touch -o target/page
     pip install pillow
     python3 page/record.py target/page docs/touch.gif
 

@@ -136,15 +136,19 @@ fn subcommand(page: &mut String, program: &str, command: &Command, shared: &BTre
     }
 }
 
-/// Returns the texts of all arguments, each with the names of the commands that have it.
-fn texts<'c>(commands: impl Iterator<Item = &'c Command>) -> BTreeMap<String, Vec<&'c str>> {
+/// Returns the texts of all arguments of the programs, each with the names of the commands that
+/// have it; a command of another program than the first has the program's name before its own.
+fn texts(programs: &[Command]) -> BTreeMap<String, Vec<String>> {
     let mut texts = BTreeMap::<_, Vec<_>>::new();
-    for command in commands {
-        for arg in own(command) {
-            texts
-                .entry(about(arg))
-                .or_default()
-                .push(command.get_name());
+    for (number, program) in programs.iter().enumerate() {
+        for command in program.get_subcommands() {
+            let name = match number {
+                0 => command.get_name().to_owned(),
+                _ => format!("{} {}", program.get_name(), command.get_name()),
+            };
+            for arg in own(command) {
+                texts.entry(about(arg)).or_default().push(name.clone());
+            }
         }
     }
     texts
@@ -170,10 +174,7 @@ fn command_line_is_that_of_the_programs() {
     ];
     let is_option = |text: &&String| text.starts_with("`-");
     // Besides them --verbose, --help and --version.
-    let all = 3 + texts(programs[0].get_subcommands())
-        .keys()
-        .filter(is_option)
-        .count();
+    let all = 3 + texts(&programs[..1]).keys().filter(is_option).count();
     let mut run = programs[0]
         .find_subcommand("run")
         .expect("a command")
@@ -184,14 +185,14 @@ fn command_line_is_that_of_the_programs() {
     let listed = help.lines().filter(is_listed).count();
     let mut page = format!(
         "# Command line\n\n{MARK}\n\n\
-         This page lists what `hapterra` and `hapterra-lab` take, as `-h` prints it. `--help` of a command explains\n\
+         This page lists the options of `hapterra` and `hapterra-lab`, as `-h` prints them. `--help` of a command explains\n\
          more. All commands take `-v` (up to `-vvv`) for more messages, `-h` and `--help`.\n\n\
          | size | |\n| --- | ---: |\n\
          | options of `hapterra` | {all} |\n\
          | options in `hapterra run -h` | {listed} |\n\
          | lines of `hapterra run -h` | {lines} |\n"
     );
-    let mut shared = texts(programs.iter().flat_map(Command::get_subcommands));
+    let mut shared = texts(&programs);
     shared.retain(|_, commands| commands.len() > 1);
     page += "\n## Options of several commands\n\n";
     for (text, commands) in &shared {
@@ -221,7 +222,7 @@ fn command_line_is_that_of_the_programs() {
 fn faults_are_those_of_the_code() {
     let mut page = format!(
         "# Faults, blockers, limits and the LED\n\n{MARK}\n\n\
-         This page lists what a board reports, with the names of `hapterra status` and of recordings.\n\n\
+         This page lists the faults, blockers and limits of a board, with the names of `hapterra status` and of recordings.\n\n\
          ## Faults\n\n\
          A fault switches the amplifiers off. It stays until it is cleared: `hapterra status --clear`.\n\n"
     );
@@ -236,7 +237,8 @@ fn faults_are_those_of_the_code() {
     for (name, meaning) in Blockers::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }
-    page += "\n## Limits\n\nA limit says why the force differs from the surface's force.\n\n";
+    page +=
+        "\n## Limits\n\nA limit is a reason why the force differs from the surface's force.\n\n";
     for (name, meaning) in Limits::all().meanings() {
         item(&mut page, &format!("`{name}`: {}", sentence(meaning)));
     }

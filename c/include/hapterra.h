@@ -503,7 +503,7 @@ const char *hapterra_contact_message(const struct HapterraContact *contact);
 
 /**
  * Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
- * for no bytes, and if there is no memory. Meant for WebAssembly; C has `malloc`.
+ * for no bytes, and if there is no memory. For WebAssembly; C has `malloc`.
  */
 void *hapterra_alloc(size_t bytes);
 

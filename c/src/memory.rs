@@ -8,7 +8,7 @@ use std::ptr::null_mut;
 const ALIGNMENT: usize = 16;
 
 /// Returns memory of `bytes` bytes, aligned to 16, that the caller owns until `hapterra_free`; null
-/// for no bytes, and if there is no memory. Meant for WebAssembly; C has `malloc`.
+/// for no bytes, and if there is no memory. For WebAssembly; C has `malloc`.
 #[unsafe(no_mangle)] // SAFETY: no other symbol begins with `hapterra_`.
 pub extern "C" fn hapterra_alloc(bytes: usize) -> *mut c_void {
     match Layout::from_size_align(bytes, ALIGNMENT) {

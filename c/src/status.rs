@@ -47,7 +47,7 @@ pub enum HapterraStatus {
 /// Texts by number.
 const TEXTS: [&CStr; 17] = [
     c"all is well",
-    c"a pointer is null: give one",
+    c"a pointer is null: pass a valid one",
     c"a pointer is not aligned or a count larger than memory",
     c"the terrain has no heights yet, or the contact has not begun",
     c"no terrain can have this size or number of samples",
@@ -55,14 +55,14 @@ const TEXTS: [&CStr; 17] = [
     c"heights are too tall or too steep: scale them down, or make no-data NaN",
     c"a parameter of a surface is out of its bounds",
     c"a material of the terrain is not one of the surfaces",
-    c"no tick rate: give 1,000 to 10,000 in whole thousands",
+    c"no tick rate: use 1,000 to 10,000 in whole thousands",
     c"a place is not a number or too far away",
     c"the reader of heights returned an error",
-    c"a path is too long for one step: go there in smaller steps",
+    c"a path is too long for one step: use smaller steps",
     c"a number is none of an enumeration's",
     c"there is no memory",
     c"the library is at fault: report it, and free the object",
-    c"a tip is no ball that can touch these cells: give a radius from 0 to 8 cells",
+    c"a tip is no ball that can touch these cells: use a radius from 0 to 8 cells",
 ];
 
 /// An error, with the message that the object keeps.

@@ -90,7 +90,7 @@ impl HapterraSurface {
 
     pub(crate) fn params(&self) -> Result<SurfaceParams, Failure> {
         let unknown = |what: &str, number: u32, known: &str| {
-            let message = format!("{what} is {number}: give {known}");
+            let message = format!("{what} is {number}: use {known}");
             Failure::new(HapterraStatus::Choice, message)
         };
         Ok(SurfaceParams {
@@ -161,7 +161,7 @@ pub(crate) unsafe fn surface(
     let Some((first, others)) = surfaces.split_first() else {
         return Err(Failure::new(
             HapterraStatus::Surface,
-            "no surface: give at least one",
+            "no surface: pass at least one",
         ));
     };
     let surface = Surface::new(first.params()?)?;

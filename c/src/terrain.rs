@@ -108,7 +108,7 @@ fn row_order(order: u32) -> Result<RowOrder, Failure> {
         0 => Ok(RowOrder::NorthFirst),
         1 => Ok(RowOrder::SouthFirst),
         other => {
-            let message = format!("row order is {other}: give 0 (north first) or 1 (south first)");
+            let message = format!("row order is {other}: use 0 (north first) or 1 (south first)");
             Err(Failure::new(HapterraStatus::Choice, message))
         }
     }

@@ -21,7 +21,7 @@ fn header_matches_the_sources() {
     let committed = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         committed == made,
-        "{} is not what the sources make: HAPTERRA_WRITE=1 cargo test -p hapterra-c --test header",
+        "{} differs from the sources: run HAPTERRA_WRITE=1 cargo test -p hapterra-c --test header",
         path.display()
     );
 }

@@ -16,7 +16,7 @@ static void expect(uint32_t found, uint32_t expected, const char *what) {
 
 static void says(const char *message, const char *part) {
     if (strstr(message, part) == NULL) {
-        printf("`%s` does not say `%s`\n", message, part);
+        printf("`%s` does not contain `%s`\n", message, part);
         failures++;
     }
 }

@@ -99,7 +99,7 @@ pub(crate) fn main() -> Result<(), CalibrationError> {
     let _ = haptics.accept(Command::Zero(arm.counts()));
     let _ = haptics.accept(Command::Arm);
 
-    println!("  time   hand wants    tip is    force up   arming      contact");
+    println!("  time  hand target    tip is    force up   arming      contact");
     let mut last = 0.0;
     for tick in 0..6_000_u16 {
         let time_s = f32::from(tick) * TICK_S;

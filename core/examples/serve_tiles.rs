@@ -133,7 +133,7 @@ pub(crate) fn main() -> Result<(), FrameError> {
         "{served} tiles in {} kB; {touching} ticks in contact",
         bytes / 1000
     );
-    println!("{waiting} ticks had to wait for a tile: it was asked for in time");
+    println!("{waiting} ticks had to wait for a tile: it was requested in time");
     assert!(touching > 4_000 && waiting == 0);
     Ok(())
 }

@@ -78,7 +78,7 @@ pub(crate) fn picture() -> Result<String, Box<dyn Error>> {
 <path d="M0 {stuck:.0}H620M0 {slid:.0}H620" stroke="#bbb" stroke-dasharray="4 4"/>
 <text x="0" y="14" fill="#b5482c">Force along the surface, for 4 s; the tip presses with 1 N</text>
 <text x="625" y="{stuck:.0}">0.6 N: breaks</text><text x="625" y="{slid:.0}">0.3 N: slides</text>
-<text x="0" y="200">Way of <tspan fill="#888">the hand, 12 mm a second</tspan>, <tspan fill="#1f5f9e">the HIP</tspan> and <tspan fill="#333">the proxy</tspan></text>
+<text x="0" y="200">Path of <tspan fill="#888">the hand, 12 mm a second</tspan>, <tspan fill="#1f5f9e">the HIP</tspan> and <tspan fill="#333">the proxy</tspan></text>
 {lines}</svg>"##
     ))
 }
@@ -89,7 +89,7 @@ fn simulate() -> Result<Vec<TickState>, Box<dyn Error>> {
     let mut field = TileArena::<2>::from_fn(size, |_, _| 0.0)?;
     let window = field.window();
     let mut contact = Contact::new(ContactSettings::AT_1_KHZ.with_friction(FRICTION));
-    // Counted from the place where the tip lands.
+    // Counted from the place of contact onset.
     let at = |x: f32, height: f32| GridPoint::new([5, 2, 0], Vec3::new(x, 0.5, height));
     contact.step(&window, &at(0.0, 1.0));
     let tick_s = TickRate::DEFAULT.tick_s();

@@ -44,7 +44,6 @@ impl<const D: usize> Haptics<'_, D> {
     pub(crate) fn cancel_change(&mut self) {
         if self.pending.take().is_some() {
             self.window.expect_fallback(None, 0);
-            self.clutch.cancel_change();
         }
     }
 

@@ -28,8 +28,8 @@
 //! ([`SceneChange::in_contact`](crate::scene::SceneChange::in_contact)):
 //!
 //! ```text
-//!         a change arrives            its terrain has arrived          the force has turned
-//! Closed ─────────────────▶ Waiting ─────────────────────────▶ Turning ────────────────────▶ Closed
+//!         a change arrives            its terrain arrives, and the force turns
+//! Closed ─────────────────▶ Turning ─────────────────────────────────────────▶ Closed
 //! ```
 //!
 //! While the force turns, it is at most the larger of the forces before and after. It does work over
@@ -75,9 +75,8 @@ pub enum ClutchMode {
 enum State {
     /// The clutch has no effect.
     Closed,
-    /// As closed, while a placement waits to change under the pressing hand.
-    Waiting,
-    /// The placement has changed under the hand: the force turns to that of the new one.
+    /// As closed, while a placement waits to change under the pressing hand, or has changed: the
+    /// force turns to that of the new one.
     Turning,
     /// The force fades out.
     Opening,
@@ -239,7 +238,7 @@ impl Clutch {
         if !self.is_held() {
             return;
         }
-        if let State::Closed | State::Waiting | State::Turning | State::Closing = self.state {
+        if let State::Closed | State::Turning | State::Closing = self.state {
             self.state = State::Opening;
             self.follows_hand = false;
         }
@@ -249,22 +248,15 @@ impl Clutch {
     /// Waits for a change of placement under the pressing hand. A clutch that is held, or closes,
     /// goes on.
     pub(crate) fn wait_for_change(&mut self) {
-        if matches!(self.state, State::Closed | State::Turning) {
-            self.state = State::Waiting;
-        }
-    }
-
-    /// Ends the wait for a change of placement.
-    pub(crate) fn cancel_change(&mut self) {
-        if matches!(self.state, State::Waiting) {
+        if self.is_closed() {
             self.state = State::Turning;
         }
     }
 
-    /// Returns true if the clutch is closed, and a placement may change under the hand: the force
+    /// Returns true if a placement may change under the hand: the clutch is not held, and the force
     /// has turned to that of the current one.
     pub(crate) fn may_change_in_contact(&self) -> bool {
-        matches!(self.state, State::Waiting) && self.turn.is_over()
+        matches!(self.state, State::Turning) && self.turn.is_over()
     }
 
     /// Continues with the force that the motors have, N, and turns it to that of the new placement:
@@ -287,7 +279,6 @@ impl Clutch {
     pub(crate) fn turned(&mut self, target_n: Vec3, has_tile: bool) -> Vec3 {
         let rest_n = self.turn.advance(target_n, self.ramp_step, has_tile);
         if self.turn.is_over() && matches!(self.state, State::Turning) {
-            self.state = State::Closed;
             self.limits = Limits::empty();
         }
         if rest_n == Vec3::ZERO || !target_n.is_finite() {
@@ -338,7 +329,8 @@ impl Clutch {
         let from_home_mm = |scene: &Scene| scene.home.to(&tip) * scene.cell_mm;
         let mut hip = tip;
         match &mut self.state {
-            State::Closed | State::Waiting | State::Turning => {}
+            State::Turning if self.turn.is_over() => self.state = State::Closed,
+            State::Closed | State::Turning => {}
             State::Opening => {
                 self.ramp -= self.fade_step;
                 if self.ramp <= 0.0 {
@@ -387,7 +379,7 @@ impl Clutch {
             false => Limits::empty(),
         };
         match self.state {
-            State::Closed | State::Waiting => Limits::empty(),
+            State::Closed => Limits::empty(),
             State::Open { .. } => by.union(Limits::CLUTCH_OPEN),
             State::Opening | State::Closing | State::Turning => by.union(Limits::CLUTCH_MOVES),
         }

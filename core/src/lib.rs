@@ -16,7 +16,7 @@
 //! let mut slope = TileArena::<2>::from_fn(size, |x, _y| 0.25 * x as f32)?;
 //! let window = slope.window();
 //!
-//! // The HIP comes down through the air and goes one cell into the ground.
+//! // The HIP descends through the air and one cell into the ground.
 //! let mut contact = Contact::new(ContactSettings::AT_1_KHZ);
 //! for height in [9.0, 6.0, 4.125] {
 //!     let hip = GridPoint::new([20, 20, 0], Vec3::new(0.5, 0.5, height));

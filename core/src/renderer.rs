@@ -258,7 +258,7 @@ impl Renderer {
             tile: None,
         });
         let (missing_count, last) = (point.missing_count, point.tile);
-        // The HIP is the point's, not the one that the landing returns.
+        // The HIP is the point's, not the one that the contact onset returns.
         let _ = self.state.contact.place_on_surface(window);
         let output = *self.state.contact.step(window, &hip);
         let may_request = missing_count < TILES_PER_SLOT * (D * D) as u32;

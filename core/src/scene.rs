@@ -72,8 +72,8 @@ impl Scene {
 /// Change of placement for an arm that stays armed: another place, scale, height or stiffness.
 ///
 /// It is set while the clutch is open, and rendered when the clutch closes. With
-/// [`Self::in_contact`] it is rendered under the pressing hand, with the force that the hand feels,
-/// as soon as the fallback of the new scene has arrived.
+/// [`Self::in_contact`] it is rendered under the pressing hand, from the present force on, as soon
+/// as the fallback of the new scene has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneChange {
     /// Number of the placement in its scene, from 1, wrapping; tick records repeat it.

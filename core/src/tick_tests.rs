@@ -20,6 +20,8 @@ use crate::terrain::{
 mod in_contact;
 #[path = "tick_tests/materials.rs"]
 mod materials;
+#[path = "tick_tests/pressed_arm.rs"]
+mod pressed_arm;
 #[path = "tick_tests/textured.rs"]
 mod textured;
 #[path = "tick_tests/views.rs"]
@@ -412,6 +414,7 @@ fn pressed(tiles: &mut [Tile]) -> (Device<'_, 4>, Vec3) {
     (device, last.sample.force_n)
 }
 
+/// Safety: 25.
 #[test]
 fn force_ramps_down_without_step_on_scene_change_or_disarm() {
     let other = Scene {
@@ -493,6 +496,7 @@ fn wave(device: &mut Device<'_, 4>, ticks: i32) -> [i32; 3] {
     counts
 }
 
+/// Safety: 35, images.
 #[test]
 fn arm_moved_during_a_replay_keeps_its_zero() {
     let mut tiles = buffers::<4>();
@@ -507,6 +511,7 @@ fn arm_moved_during_a_replay_keeps_its_zero() {
     assert_eq!(device.haptics.zero, Some([0; 3]));
 }
 
+/// Safety: 35, images.
 #[test]
 fn encoder_jump_during_a_replay_is_detected() {
     let mut tiles = buffers::<4>();
@@ -531,6 +536,7 @@ fn encoder_jump_during_a_replay_is_detected() {
     }
 }
 
+/// Safety: 35.
 #[test]
 fn replay_drives_no_motor_and_refuses_arming_with_its_blocker() {
     let mut tiles = buffers::<4>();
@@ -709,6 +715,7 @@ fn held_outputs_reach_drive_only_with_amplifiers_off() {
     assert_eq!(drive.held, Vec3::ZERO);
 }
 
+/// Safety: 7.
 #[test]
 fn refused_scene_fades_the_force_out() {
     let mut tiles = buffers::<1>();

@@ -54,7 +54,7 @@ def main():
         elif process is None or process.poll() is not None:
             process = subprocess.Popen([*speaker, text])
         else:
-            # Still speaking: the next event has the height, too.
+            # Still speaking: the next event also has the height.
             continue
         spoken = height
 

@@ -178,6 +178,7 @@ mod tests {
         assert_eq!((crash.kind, crash.tick), (CrashKind::SupplyLow, 9));
     }
 
+    /// Safety: images.
     #[test]
     fn bare_record_keeps_kind_and_rejects_flipped_bits() {
         for kind in KINDS {

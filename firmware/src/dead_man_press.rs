@@ -1,6 +1,6 @@
-//! A press of the dead-man switch as consent, which a host cannot give.
+//! A press of the dead-man switch as consent, which a host cannot replace.
 //!
-//! A stored record decides what the guard protects from the next start on, for every later user of
+//! A stored record sets the guard's limits from the next start on, for every later user of
 //! the arm. So the user at the arm has to agree: after the request, the switch must be open and
 //! then pressed, within [`PRESS_TIMEOUT_MS`], while the arm is disarmed.
 

@@ -27,7 +27,7 @@
 //! | [`store`] | the calibration record in flash |
 //! | [`crash`] | the record of a program's end, kept over the reset |
 //! | [`motor_memory`] | the motors' temperatures, kept over the reset |
-//! | `dead_man_press` | the press of the dead-man switch that a stored record needs |
+//! | `dead_man_press` | the press of the dead-man switch required to store a record |
 //! | [`native`] | the same application as a value in a host program |
 //!
 //! The images are in `boards/`.

@@ -58,8 +58,8 @@ impl Monitor {
     /// Returns true if the watchdog is to be fed now: all of `parts` have checked in since this
     /// last returned true. Called a few times within the watchdog's time.
     ///
-    /// A part in `parts` that does not check in leads to a reset; other parts are not watched. From
-    /// the count of feedings the tick knows that the watchdog is being fed.
+    /// A part in `parts` that does not check in leads to a reset; other parts are not watched. The
+    /// tick checks by the count of feedings that the watchdog is being fed.
     #[must_use]
     pub fn may_feed_watchdog(&self, parts: &[WatchedPart]) -> bool {
         let all = parts.iter().fold(0, |bits, part| bits | part.bit());
@@ -141,7 +141,7 @@ mod tests {
                 assert!(!monitor.may_feed_watchdog(&PARTS), "{hung:?}");
             }
             monitor.check_in(hung);
-            assert!(monitor.may_feed_watchdog(&PARTS), "{hung:?} came back");
+            assert!(monitor.may_feed_watchdog(&PARTS), "{hung:?} runs again");
             assert_eq!(monitor.fed(), 1);
             monitor.check_in(hung);
             let again = monitor.may_feed_watchdog(&PARTS);

@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{gdal:?}, {dataset:?}");
     println!("geo transform {:?}", dataset.geo_transform());
     for part in dataset.subdatasets() {
-        println!("holds {}: {}", part.name, part.title);
+        println!("contains {}: {}", part.name, part.title);
     }
     for number in 1..=dataset.bands() {
         let band = dataset.band(number)?;

@@ -21,13 +21,13 @@ impl Library {
     /// raster, GDAL always treats it as x.
     #[must_use]
     pub fn last_axis(&self, path: &Path, variable: &str) -> Axis {
-        let Ok(dataset) = Dataset::open_arrays(self.loaded.clone(), path) else {
+        let Ok(dataset) = Dataset::open_arrays(self.libgdal.clone(), path) else {
             return Axis::X;
         };
         let Ok(name) = to_c(variable) else {
             return Axis::X;
         };
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the dataset stays open until the end; each handle is used before its single
         // release; the list of dimensions has GDAL's count.
         let kind = unsafe {

@@ -4,7 +4,7 @@ use std::ffi::{c_int, c_void};
 
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::pending_calls::Call;
 use crate::text::from_c;
 
@@ -19,7 +19,7 @@ const NO_DATA: c_int = 8;
 /// A band of an open raster, or an overview or mask of one.
 #[derive(Clone, Copy)]
 pub struct Band<'d> {
-    loaded: &'d Loaded,
+    libgdal: &'d Libgdal,
     handle: Handle,
 }
 
@@ -126,14 +126,14 @@ impl SampleType {
 
 impl<'d> Band<'d> {
     /// Returns a band by its handle; `None` if it is null.
-    pub(crate) fn of(loaded: &'d Loaded, handle: Handle) -> Option<Self> {
-        (!handle.is_null()).then_some(Self { loaded, handle })
+    pub(crate) fn of(libgdal: &'d Libgdal, handle: Handle) -> Option<Self> {
+        (!handle.is_null()).then_some(Self { libgdal, handle })
     }
 
     /// Returns columns and rows.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the band's dataset is open.
         let size = unsafe {
             [
@@ -150,7 +150,7 @@ impl<'d> Band<'d> {
         let (mut columns, mut rows) = (0, 0);
         // SAFETY: both pointers are valid for a write.
         unsafe {
-            (self.loaded.functions.GDALGetBlockSize)(self.handle, &raw mut columns, &raw mut rows);
+            (self.libgdal.functions.GDALGetBlockSize)(self.handle, &raw mut columns, &raw mut rows);
         }
         [columns, rows].map(|count| count.max(1) as u32)
     }
@@ -160,7 +160,7 @@ impl<'d> Band<'d> {
     /// # Errors
     /// The name of a complex type, or of a type that is newer than this crate.
     pub fn sample_type(&self) -> Result<SampleType, String> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the band's dataset is open; the name is static, and is copied.
         unsafe {
             let code = (functions.GDALGetRasterDataType)(self.handle);
@@ -174,19 +174,19 @@ impl<'d> Band<'d> {
     /// Returns the value that marks no-data.
     #[must_use]
     pub fn no_data(&self) -> Option<f64> {
-        self.number(self.loaded.functions.GDALGetRasterNoDataValue)
+        self.number(self.libgdal.functions.GDALGetRasterNoDataValue)
     }
 
     /// Returns the factor of samples, applied before the [offset](Self::offset).
     #[must_use]
     pub fn scale(&self) -> Option<f64> {
-        self.number(self.loaded.functions.GDALGetRasterScale)
+        self.number(self.libgdal.functions.GDALGetRasterScale)
     }
 
     /// Returns the offset of samples.
     #[must_use]
     pub fn offset(&self) -> Option<f64> {
-        self.number(self.loaded.functions.GDALGetRasterOffset)
+        self.number(self.libgdal.functions.GDALGetRasterOffset)
     }
 
     fn number(&self, of: unsafe extern "C" fn(Handle, *mut c_int) -> f64) -> Option<f64> {
@@ -200,14 +200,14 @@ impl<'d> Band<'d> {
     #[must_use]
     pub fn unit(&self) -> Option<String> {
         // SAFETY: the band's dataset is open; the text is copied.
-        unsafe { from_c((self.loaded.functions.GDALGetRasterUnitType)(self.handle)) }
+        unsafe { from_c((self.libgdal.functions.GDALGetRasterUnitType)(self.handle)) }
     }
 
     /// Returns the band's name in the file.
     #[must_use]
     pub fn description(&self) -> Option<String> {
         // SAFETY: as above.
-        unsafe { from_c((self.loaded.functions.GDALGetDescription)(self.handle)) }
+        unsafe { from_c((self.libgdal.functions.GDALGetDescription)(self.handle)) }
     }
 
     /// Returns an item of its metadata, from the default domain.
@@ -216,19 +216,19 @@ impl<'d> Band<'d> {
     /// [`Error::ZeroByte`].
     pub fn metadata(&self, name: &str) -> Result<Option<String>, Error> {
         // SAFETY: the band's dataset is open.
-        unsafe { self.loaded.metadata(self.handle, name, None) }
+        unsafe { self.libgdal.metadata(self.handle, name, None) }
     }
 
     /// Returns its overviews, in the file's order.
     #[must_use]
     pub fn overviews(&self) -> Vec<Self> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the band's dataset is open and owns the overviews, whose numbers start at 0.
         unsafe {
             let count = (functions.GDALGetOverviewCount)(self.handle);
             let overviews =
                 (0..count).map(|number| (functions.GDALGetOverview)(self.handle, number));
-            let bands = overviews.filter_map(|handle| Self::of(self.loaded, handle));
+            let bands = overviews.filter_map(|handle| Self::of(self.libgdal, handle));
             bands.collect()
         }
     }
@@ -237,7 +237,7 @@ impl<'d> Band<'d> {
     #[must_use]
     pub fn mask(&self) -> Mask {
         // SAFETY: the band's dataset is open.
-        let flags = unsafe { (self.loaded.functions.GDALGetMaskFlags)(self.handle) };
+        let flags = unsafe { (self.libgdal.functions.GDALGetMaskFlags)(self.handle) };
         match flags & (ALL_VALID | NO_DATA) {
             0 => Mask::Band,
             _ => Mask::None,
@@ -248,8 +248,8 @@ impl<'d> Band<'d> {
     #[must_use]
     pub fn mask_band(&self) -> Option<Self> {
         // SAFETY: the band's dataset is open, and owns the mask.
-        let handle = unsafe { (self.loaded.functions.GDALGetMaskBand)(self.handle) };
-        Self::of(self.loaded, handle)
+        let handle = unsafe { (self.libgdal.functions.GDALGetMaskBand)(self.handle) };
+        Self::of(self.libgdal, handle)
     }
 
     /// Reads a window into `samples`, row after row.
@@ -283,9 +283,9 @@ impl<'d> Band<'d> {
         // At most the band's size, which GDAL stores as `c_int`.
         let [x, y, width, height] = [column, row, columns, rows].map(|count| count as c_int);
         let buffer = samples.as_mut_ptr().cast::<c_void>();
-        self.loaded.prepare_thread();
+        self.libgdal.prepare_thread();
         let _call = Call::begin();
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the buffer has space for the window's samples of that type, without gaps.
         let status = unsafe {
             (functions.CPLErrorReset)();
@@ -306,7 +306,7 @@ impl<'d> Band<'d> {
         };
         match status <= WARNING {
             true => Ok(()),
-            false => Err(self.loaded.refused("the samples cannot be read")),
+            false => Err(self.libgdal.refused("the samples cannot be read")),
         }
     }
 }

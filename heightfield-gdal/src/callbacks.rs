@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::error::Error;
 use crate::file_system::{PREFIX, ReadAt};
 use crate::functions::Stat;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::mount::{Mounted, at};
 use crate::text::{from_c, to_c};
 
@@ -30,14 +30,14 @@ struct OpenFile {
 ///
 /// # Errors
 /// [`Error::Refused`].
-pub(crate) fn install(loaded: &Loaded) -> Result<(), Error> {
+pub(crate) fn install(libgdal: &Libgdal) -> Result<(), Error> {
     static IS_INSTALLED: Mutex<bool> = Mutex::new(false);
     let mut is_installed = IS_INSTALLED.lock().unwrap_or_else(PoisonError::into_inner);
     if *is_installed {
         return Ok(());
     }
-    let refused = || loaded.refused("it takes no files from its caller");
-    let functions = &loaded.functions;
+    let refused = || libgdal.refused("it accepts no files from its caller");
+    let functions = &libgdal.functions;
     // SAFETY: GDAL's own structure, whose fields set here are the same in all versions; GDAL copies
     // it. Prefix and functions exist as long as the process.
     unsafe {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::band::Band;
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::mount::{self, Mounted};
 use crate::text::{from_c, list_from_c, path_to_c, to_c};
 
@@ -25,14 +25,14 @@ const COMMON_OPEN_OPTIONS: [&str; 1] = ["OVERVIEW_LEVEL"];
 
 /// An open raster, closed on drop.
 pub struct Dataset {
-    pub(crate) loaded: Arc<Loaded>,
+    pub(crate) libgdal: Arc<Libgdal>,
     handle: Handle,
     /// The file system of its files, if GDAL reads them through its caller.
     files: Option<Arc<Mounted>>,
 }
 
-// SAFETY: a dataset may move to another thread if only one thread at a time uses it, which is what
-// `Send` without `Sync` means.
+// SAFETY: a dataset may move to another thread if only one thread at a time uses it, as `Send`
+// without `Sync` ensures.
 unsafe impl Send for Dataset {}
 
 /// One of several rasters in a file.
@@ -45,15 +45,19 @@ pub struct Subdataset {
 }
 
 impl Dataset {
-    pub(crate) fn open(loaded: Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Self, Error> {
-        loaded.prepare_thread();
+    pub(crate) fn open(
+        libgdal: Arc<Libgdal>,
+        path: &Path,
+        options: &[&str],
+    ) -> Result<Self, Error> {
+        libgdal.prepare_thread();
         let files = mounted_in(path);
         let path = path_to_c(path)?;
         let options: Result<Vec<_>, _> = options.iter().map(|option| to_c(option)).collect();
         let options = options?;
         let list = options.iter().map(|option| option.as_ptr());
         let list: Vec<*const c_char> = list.chain([ptr::null()]).collect();
-        let functions = &loaded.functions;
+        let functions = &libgdal.functions;
         // SAFETY: texts and list are valid during the call; null means all drivers, and a search
         // for siblings.
         let handle = unsafe {
@@ -62,10 +66,10 @@ impl Dataset {
             (functions.GDALOpenEx)(path.as_ptr(), OPEN_FLAGS, drivers, list.as_ptr(), siblings)
         };
         if handle.is_null() {
-            return Err(loaded.refused("no driver knows the file"));
+            return Err(libgdal.refused("no driver supports the file"));
         }
         let dataset = Self {
-            loaded,
+            libgdal,
             handle,
             files,
         };
@@ -75,11 +79,11 @@ impl Dataset {
 
     /// Checks that the driver supports the open options: GDAL ignores unknown ones.
     fn check_options(&self, options: &[CString]) -> Result<(), Error> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the dataset is open, and its driver is never freed.
         let list = unsafe {
             let driver = (functions.GDALGetDatasetDriver)(self.handle);
-            self.loaded.metadata(driver, "DMD_OPENOPTIONLIST", None)?
+            self.libgdal.metadata(driver, "DMD_OPENOPTIONLIST", None)?
         };
         let list = list.unwrap_or_default().replace('"', "'");
         let available = list.split("name='").skip(1);
@@ -108,7 +112,7 @@ impl Dataset {
     /// Returns the files that belong to it: its own, those beside it, and those that it references.
     #[must_use]
     pub fn files(&self) -> Vec<PathBuf> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the dataset is open; the list is copied, and freed once.
         let names = unsafe {
             let list = (functions.GDALGetFileList)(self.handle);
@@ -120,20 +124,20 @@ impl Dataset {
     }
 
     /// Opens the same file as a tree of arrays.
-    pub(crate) fn open_arrays(loaded: Arc<Loaded>, path: &Path) -> Result<Self, Error> {
-        loaded.prepare_thread();
+    pub(crate) fn open_arrays(libgdal: Arc<Libgdal>, path: &Path) -> Result<Self, Error> {
+        libgdal.prepare_thread();
         let files = mounted_in(path);
         let path = path_to_c(path)?;
         let none = ptr::null();
         // SAFETY: the path is valid during the call.
         let handle = unsafe {
-            (loaded.functions.CPLErrorReset)();
-            (loaded.functions.GDALOpenEx)(path.as_ptr(), ARRAYS, none, none, none)
+            (libgdal.functions.CPLErrorReset)();
+            (libgdal.functions.GDALOpenEx)(path.as_ptr(), ARRAYS, none, none, none)
         };
         match handle.is_null() {
-            true => Err(loaded.refused("it has no arrays")),
+            true => Err(libgdal.refused("it has no arrays")),
             false => Ok(Self {
-                loaded,
+                libgdal,
                 handle,
                 files,
             }),
@@ -154,7 +158,7 @@ impl Dataset {
     /// Returns the driver's short name, as `HFA`.
     #[must_use]
     pub fn driver(&self) -> String {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the dataset is open, and its driver is never freed.
         let name = unsafe {
             let driver = (functions.GDALGetDatasetDriver)(self.handle);
@@ -171,7 +175,7 @@ impl Dataset {
     #[must_use]
     pub fn bands(&self) -> u32 {
         // SAFETY: the dataset is open.
-        let count = unsafe { (self.loaded.functions.GDALGetRasterCount)(self.handle) };
+        let count = unsafe { (self.libgdal.functions.GDALGetRasterCount)(self.handle) };
         count.max(0) as u32
     }
 
@@ -183,8 +187,8 @@ impl Dataset {
         let no_such = || Error::NoSuchPart {
             requested: format!("band {number}"),
             available: match self.bands() {
-                0 => "the file holds no band of its own".to_owned(),
-                1 => "the file has band 1 alone".to_owned(),
+                0 => "the file contains no band of its own".to_owned(),
+                1 => "the file has only band 1".to_owned(),
                 bands => format!("the file has bands 1 to {bands}"),
             },
         };
@@ -193,18 +197,19 @@ impl Dataset {
         }
         // SAFETY: the open dataset has a band of this number.
         let handle =
-            unsafe { (self.loaded.functions.GDALGetRasterBand)(self.handle, number as i32) };
-        Band::of(&self.loaded, handle).ok_or_else(no_such)
+            unsafe { (self.libgdal.functions.GDALGetRasterBand)(self.handle, number as i32) };
+        Band::of(&self.libgdal, handle).ok_or_else(no_such)
     }
 
-    /// Returns the map from columns and rows to coordinates: x = `[0]` + column · `[1]` + row · `[2]`,
-    /// y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's cell.
+    /// Returns the map from columns and rows to coordinates: x = `[0]` + column · `[1]` + row ·
+    /// `[2]`, y = `[3]` + column · `[4]` + row · `[5]`, from the outer corner of the first sample's
+    /// cell.
     #[must_use]
     pub fn geo_transform(&self) -> Option<[f64; 6]> {
         let mut numbers = [0.0; 6];
         // SAFETY: the array has space for six numbers.
         let status = unsafe {
-            (self.loaded.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
+            (self.libgdal.functions.GDALGetGeoTransform)(self.handle, numbers.as_mut_ptr())
         };
         (status == FINE && numbers.iter().all(|number| number.is_finite())).then_some(numbers)
     }
@@ -213,7 +218,7 @@ impl Dataset {
     #[must_use]
     pub fn wkt(&self) -> Option<String> {
         // SAFETY: the dataset is open; the text is copied.
-        unsafe { from_c((self.loaded.functions.GDALGetProjectionRef)(self.handle)) }
+        unsafe { from_c((self.libgdal.functions.GDALGetProjectionRef)(self.handle)) }
     }
 
     /// Returns an item of its metadata, from the named domain or the default one.
@@ -222,7 +227,7 @@ impl Dataset {
     /// [`Error::ZeroByte`].
     pub fn metadata(&self, name: &str, domain: Option<&str>) -> Result<Option<String>, Error> {
         // SAFETY: the dataset is open.
-        unsafe { self.loaded.metadata(self.handle, name, domain) }
+        unsafe { self.libgdal.metadata(self.handle, name, domain) }
     }
 
     /// Returns the items of its own metadata whose names end with `end`, each with its name without
@@ -257,7 +262,7 @@ impl Dataset {
     }
 
     fn list(&self, domain: &CStr) -> Vec<String> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the dataset is open; the list is copied.
         unsafe { list_from_c((functions.GDALGetMetadata)(self.handle, domain.as_ptr())) }
     }
@@ -271,7 +276,7 @@ impl Drop for Dataset {
     fn drop(&mut self) {
         // SAFETY: opened once, and closed once; bands borrow the dataset. The result is ignored,
         // because nothing was written.
-        unsafe { (self.loaded.functions.GDALClose)(self.handle) };
+        unsafe { (self.libgdal.functions.GDALClose)(self.handle) };
     }
 }
 

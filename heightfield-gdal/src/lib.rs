@@ -15,7 +15,8 @@
 //!
 //! - [`Library`]: finds and loads libgdal, versions 3.4 and newer, and lists its drivers;
 //! - [`Dataset`]: a file, a folder or other source that a driver opens, for reading;
-//! - [`Library::mount`]: lets GDAL read files through this crate's user, such as files on a server;
+//! - [`Library::mount`]: makes GDAL read files through this crate's user, such as files on a
+//!   server;
 //! - [`Library::entries`], [`Library::length`]: the contents of an archive;
 //! - [`Band`]: its samples, overviews and masks, and their meaning;
 //! - [`SpatialReference`]: a reference system from PROJ, by its text or code.
@@ -34,8 +35,8 @@ mod dataset;
 mod error;
 mod file_system;
 mod functions;
+mod libgdal;
 mod library;
-mod loaded;
 mod mount;
 mod mrf;
 mod open_timeout;

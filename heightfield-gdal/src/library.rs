@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::dataset::Dataset;
 use crate::error::Error;
 use crate::file_system::{FileSystem, PREFIX};
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::mount::{Mount, Mounted};
 use crate::settings::Settings;
 use crate::srs::SpatialReference;
@@ -27,7 +27,7 @@ pub struct Driver {
 /// A loaded libgdal, which stays loaded until the process ends. Clones share it.
 #[derive(Clone)]
 pub struct Library {
-    pub(crate) loaded: Arc<Loaded>,
+    pub(crate) libgdal: Arc<Libgdal>,
 }
 
 impl Library {
@@ -37,26 +37,26 @@ impl Library {
     /// # Errors
     /// [`Error::NotFound`], [`Error::Version`], [`Error::Incomplete`]. The next call retries.
     pub fn load(settings: Settings) -> Result<Self, Error> {
-        let loaded = Loaded::load(settings)?;
-        Ok(Self { loaded })
+        let libgdal = Libgdal::load(settings)?;
+        Ok(Self { libgdal })
     }
 
     /// Returns its path, or its name in the system.
     #[must_use]
     pub fn path(&self) -> &Path {
-        &self.loaded.path
+        &self.libgdal.path
     }
 
     /// Returns its version.
     #[must_use]
     pub fn version(&self) -> Version {
-        self.loaded.version
+        self.libgdal.version
     }
 
     /// Returns the drivers that read rasters, in GDAL's order.
     #[must_use]
     pub fn drivers(&self) -> Vec<Driver> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: drivers are numbered from 0, and are never freed.
         let count = unsafe { (functions.GDALGetDriverCount)() };
         let drivers = (0..count).filter_map(|number| {
@@ -87,8 +87,8 @@ impl Library {
     /// [`Error::Refused`] with GDAL's message, [`Error::NotOpened`], [`Error::OpenOption`],
     /// [`Error::Slow`], [`Error::ZeroByte`].
     pub fn open(&self, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
-        path_check::check(&self.loaded, path)?;
-        open_timeout::open(&self.loaded, path, options)
+        path_check::check(&self.libgdal, path)?;
+        open_timeout::open(&self.libgdal, path, options)
     }
 
     /// Lets GDAL read files through this crate's user.
@@ -96,8 +96,8 @@ impl Library {
     /// # Errors
     /// [`Error::Refused`].
     pub fn mount(&self, files: Box<dyn FileSystem>) -> Result<Mount, Error> {
-        callbacks::install(&self.loaded)?;
-        Ok(Mount(Mounted::new(self.loaded.clone(), files)))
+        callbacks::install(&self.libgdal)?;
+        Ok(Mount(Mounted::new(self.libgdal.clone(), files)))
     }
 
     /// Returns a reference system by its text.
@@ -106,7 +106,7 @@ impl Library {
     /// [`Error::Refused`] with GDAL's message, also if it is neither geographic nor projected;
     /// [`Error::ZeroByte`].
     pub fn reference_of_text(&self, text: &str) -> Result<SpatialReference, Error> {
-        SpatialReference::of_text(&self.loaded, text)
+        SpatialReference::of_text(&self.libgdal, text)
     }
 
     /// Returns a reference system by its EPSG code.
@@ -114,7 +114,7 @@ impl Library {
     /// # Errors
     /// [`Error::Refused`] with GDAL's message.
     pub fn reference_of_epsg(&self, code: u16) -> Result<SpatialReference, Error> {
-        SpatialReference::of_epsg(&self.loaded, code)
+        SpatialReference::of_epsg(&self.libgdal, code)
     }
 
     /// Opens a part by a driver's or an archive's name, as `NETCDF:"ocean.nc":depth` of an open
@@ -123,7 +123,7 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open), but without checks before opening.
     pub fn open_part(&self, name: &str, options: &[&str]) -> Result<Dataset, Error> {
-        let dataset = open_timeout::open(&self.loaded, Path::new(name), options)?;
+        let dataset = open_timeout::open(&self.libgdal, Path::new(name), options)?;
         // A VRT on disk is checked before; in an archive, it could reference pipes, devices and
         // URLs.
         let is_in_archive = name.starts_with("/vsi") && !name.starts_with(PREFIX);

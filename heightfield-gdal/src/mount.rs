@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::error::Error;
 use crate::file_system::{FileSystem, PREFIX, ReadAt};
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::{mrf, vrt};
 
 /// A file system under GDAL names, until the last clone and the last [`Dataset`](crate::Dataset) in
@@ -21,7 +21,7 @@ pub struct Mount(pub(crate) Arc<Mounted>);
 /// State shared by all clones.
 pub(crate) struct Mounted {
     number: u64,
-    library: Arc<Loaded>,
+    library: Arc<Libgdal>,
     files: Box<dyn FileSystem>,
     state: Mutex<State>,
 }
@@ -75,7 +75,7 @@ impl fmt::Debug for Mount {
 }
 
 impl Mounted {
-    pub(crate) fn new(library: Arc<Loaded>, files: Box<dyn FileSystem>) -> Arc<Self> {
+    pub(crate) fn new(library: Arc<Libgdal>, files: Box<dyn FileSystem>) -> Arc<Self> {
         static NUMBERS: AtomicU64 = AtomicU64::new(1);
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
         let new = Arc::new(Self {
@@ -92,7 +92,7 @@ impl Mounted {
         format!("{PREFIX}{}/", self.number)
     }
 
-    pub(crate) fn library(&self) -> &Loaded {
+    pub(crate) fn library(&self) -> &Libgdal {
         &self.library
     }
 
@@ -198,7 +198,7 @@ impl Mounted {
         Ok(Text(text.into_bytes()))
     }
 
-    /// Returns the names of the files beside a file, if they are known.
+    /// Returns the names of the files beside a file, if they were listed.
     pub(crate) fn neighbours(&self, name: &str) -> Option<Vec<String>> {
         let name = plain(name)?;
         self.read(|| self.files.neighbours(&name))

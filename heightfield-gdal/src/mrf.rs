@@ -1,7 +1,7 @@
 //! File names in an MRF's header: its samples and their index.
 
 use crate::error::Error;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::xml;
 
 /// GDAL recognises an MRF by its first bytes.
@@ -27,8 +27,8 @@ pub(crate) fn too_large() -> String {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`]; as a text, the referenced file and a remedy.
-pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>, Error> {
-    // GDAL stops at a zero byte, too.
+pub(crate) fn check(library: &Libgdal, header: &str) -> Result<Result<(), String>, Error> {
+    // GDAL also stops at a zero byte.
     let header = header.replace('\0', " ");
     for named in xml::texts(library, &header)? {
         let is_any_of = |names: &[&str]| {
@@ -39,7 +39,7 @@ pub(crate) fn check(library: &Loaded, header: &str) -> Result<Result<(), String>
         let leaves_folder = is_any_of(&NEIGHBOUR_KEYS) && !is_neighbour(name);
         if leaves_folder || is_any_of(&[COPIED_KEY]) {
             return Ok(Err(format!(
-                "it names {name}, which need not lie beside it: get both files, and open the MRF here"
+                "it names {name}, which may be in another folder: get both files, and open the MRF here"
             )));
         }
     }

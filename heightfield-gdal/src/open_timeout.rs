@@ -8,14 +8,14 @@ use std::time::{Duration, Instant};
 
 use crate::dataset::Dataset;
 use crate::error::Error;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::mount;
 use crate::pending_calls::Call;
 
 /// Time limit for opening, without GDAL's waits for files from the caller. A VRT of 26,000 files
 /// opens within a second.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(6);
-/// Max time of waits that is not counted: a single request takes less.
+/// Max time of waits that is not counted: a single request is shorter.
 const MAX_SERVER_WAIT: Duration = Duration::from_secs(120);
 /// Interval between checks of the time.
 const MIN_POLL: Duration = Duration::from_millis(50);
@@ -24,21 +24,25 @@ const MIN_POLL: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// As [`Dataset::open`]; [`Error::Slow`].
-pub(crate) fn open(loaded: &Arc<Loaded>, path: &Path, options: &[&str]) -> Result<Dataset, Error> {
+pub(crate) fn open(
+    libgdal: &Arc<Libgdal>,
+    path: &Path,
+    options: &[&str],
+) -> Result<Dataset, Error> {
     let started = Instant::now();
     let slow = || Error::Slow {
         path: path.to_owned(),
         seconds: started.elapsed().as_secs(),
     };
     let (send, opened) = sync_channel(1);
-    let (loaded, own) = (loaded.clone(), path.to_owned());
+    let (libgdal, own) = (libgdal.clone(), path.to_owned());
     let options: Vec<String> = options.iter().map(|&option| option.to_owned()).collect();
     let call = Call::begin();
     let open = move || {
         let _call = call;
         let options: Vec<&str> = options.iter().map(String::as_str).collect();
-        // The caller may have given up.
-        let _ = send.send(Dataset::open(loaded, &own, &options));
+        // The caller may no longer wait.
+        let _ = send.send(Dataset::open(libgdal, &own, &options));
     };
     let thread = Builder::new().name("GDAL opens a file".into());
     thread.spawn(open).map_err(|_| slow())?;

@@ -1,5 +1,5 @@
-//! Checks before GDAL opens a file: GDAL would wait for a pipe for ever, start a device, and open
-//! all files that a VRT references.
+//! Checks before GDAL opens a file: GDAL would wait for a pipe indefinitely, start a device, and
+//! open all files that a VRT references.
 
 use std::collections::HashSet;
 use std::fs::{self, File, FileType};
@@ -7,7 +7,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::vrt;
 use crate::xml::Text;
 
@@ -15,7 +15,7 @@ use crate::xml::Text;
 ///
 /// # Errors
 /// [`Error::NotOpened`].
-pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
+pub(crate) fn check(library: &Libgdal, path: &Path) -> Result<(), Error> {
     let names = Names {
         library,
         visited: HashSet::new(),
@@ -27,7 +27,7 @@ pub(crate) fn check(library: &Loaded, path: &Path) -> Result<(), Error> {
 
 /// A traversal of the files that VRTs reference.
 struct Names<'l> {
-    library: &'l Loaded,
+    library: &'l Libgdal,
     visited: HashSet<PathBuf>,
 }
 

@@ -5,7 +5,7 @@ use std::ptr;
 
 use crate::error::Error;
 use crate::functions::Handle;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::text::{from_c, to_c};
 
 /// `OGRERR_NONE`.
@@ -50,57 +50,57 @@ pub enum AxisUnit {
 
 /// A system in GDAL's memory.
 struct Owned<'l> {
-    loaded: &'l Loaded,
+    libgdal: &'l Libgdal,
     handle: Handle,
 }
 
 impl Drop for Owned<'_> {
     fn drop(&mut self) {
         // SAFETY: created by GDAL, and freed once.
-        unsafe { (self.loaded.functions.OSRDestroySpatialReference)(self.handle) };
+        unsafe { (self.libgdal.functions.OSRDestroySpatialReference)(self.handle) };
     }
 }
 
 impl SpatialReference {
     /// Creates a system from its text (WKT of any kind).
-    pub(crate) fn of_text(loaded: &Loaded, text: &str) -> Result<Self, Error> {
+    pub(crate) fn of_text(libgdal: &Libgdal, text: &str) -> Result<Self, Error> {
         let text = to_c(text)?;
-        let system = Owned::new(loaded)?;
+        let system = Owned::new(libgdal)?;
         let mut at = text.as_ptr().cast_mut();
         // SAFETY: GDAL advances the pointer past the text that it has read, and does not write to
         // it.
-        let status = unsafe { (loaded.functions.OSRImportFromWkt)(system.handle, &raw mut at) };
+        let status = unsafe { (libgdal.functions.OSRImportFromWkt)(system.handle, &raw mut at) };
         system.read(status)
     }
 
     /// Creates a system from its code.
-    pub(crate) fn of_epsg(loaded: &Loaded, code: u16) -> Result<Self, Error> {
-        let system = Owned::new(loaded)?;
+    pub(crate) fn of_epsg(libgdal: &Libgdal, code: u16) -> Result<Self, Error> {
+        let system = Owned::new(libgdal)?;
         // SAFETY: the system was made above.
-        let status = unsafe { (loaded.functions.OSRImportFromEPSG)(system.handle, code.into()) };
+        let status = unsafe { (libgdal.functions.OSRImportFromEPSG)(system.handle, code.into()) };
         system.read(status)
     }
 }
 
 impl<'l> Owned<'l> {
-    fn new(loaded: &'l Loaded) -> Result<Self, Error> {
+    fn new(libgdal: &'l Libgdal) -> Result<Self, Error> {
         // SAFETY: null means an empty system.
         let handle = unsafe {
-            (loaded.functions.CPLErrorReset)();
-            (loaded.functions.OSRNewSpatialReference)(ptr::null())
+            (libgdal.functions.CPLErrorReset)();
+            (libgdal.functions.OSRNewSpatialReference)(ptr::null())
         };
         match handle.is_null() {
-            true => Err(loaded.refused("no reference system can be made")),
-            false => Ok(Self { loaded, handle }),
+            true => Err(libgdal.refused("no reference system can be made")),
+            false => Ok(Self { libgdal, handle }),
         }
     }
 
     fn read(&self, status: c_int) -> Result<SpatialReference, Error> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         let handle = self.handle;
         let refused = || {
-            self.loaded
-                .refused("PROJ does not know the reference system")
+            self.libgdal
+                .refused("PROJ does not support the reference system")
         };
         // SAFETY: here and below, the system exists, and each function only reads it; null means an
         // unneeded name, and the pointers to numbers are valid.
@@ -151,7 +151,7 @@ impl<'l> Owned<'l> {
     fn attribute(&self, name: &CStr) -> Option<String> {
         // SAFETY: the system exists; the text is copied.
         unsafe {
-            from_c((self.loaded.functions.OSRGetAttrValue)(
+            from_c((self.libgdal.functions.OSRGetAttrValue)(
                 self.handle,
                 name.as_ptr(),
                 0,
@@ -162,13 +162,13 @@ impl<'l> Owned<'l> {
     /// Returns its geographic system.
     fn base(&self) -> Option<Self> {
         // SAFETY: the system exists; the copy is a new one.
-        let handle = unsafe { (self.loaded.functions.OSRCloneGeogCS)(self.handle) };
+        let handle = unsafe { (self.libgdal.functions.OSRCloneGeogCS)(self.handle) };
         (!handle.is_null()).then_some(Self { handle, ..*self })
     }
 
     /// Returns the system in PROJ's syntax.
     fn proj(&self) -> Option<String> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         let mut text: *mut c_char = ptr::null_mut();
         // SAFETY: GDAL returns a text, which is copied and freed.
         unsafe {
@@ -193,7 +193,7 @@ impl<'l> Owned<'l> {
 
     /// Returns the stated EPSG code of a part, or of the system itself (null).
     fn code_of(&self, part: *const c_char) -> Option<u32> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the part is null or a valid text; texts are copied.
         let (authority, code) = unsafe {
             (
@@ -206,7 +206,7 @@ impl<'l> Owned<'l> {
     }
 
     fn matching(&self) -> Option<u32> {
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         let (mut count, mut sureness) = (0, ptr::null_mut());
         // SAFETY: GDAL returns a list of `count` systems and one of as many numbers, which are
         // freed below.

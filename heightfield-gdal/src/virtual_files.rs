@@ -17,13 +17,13 @@ impl Library {
     /// [`Error::Refused`], [`Error::ZeroByte`].
     pub fn entries(&self, folder: &Path) -> Result<Vec<String>, Error> {
         let path = path_to_c(folder)?;
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the path is valid during the call; the list is copied, and freed once.
         let names = unsafe {
             (functions.CPLErrorReset)();
             let list = (functions.VSIReadDirRecursive)(path.as_ptr());
             if list.is_null() {
-                return Err(self.loaded.refused("it is no archive that can be read"));
+                return Err(self.libgdal.refused("it is no archive that can be read"));
             }
             let names = list_from_c(list.cast());
             (functions.CSLDestroy)(list);
@@ -37,7 +37,7 @@ impl Library {
     #[must_use]
     pub fn length(&self, path: &Path) -> Option<u64> {
         let path = path_to_c(path).ok()?;
-        let functions = &self.loaded.functions;
+        let functions = &self.libgdal.functions;
         // SAFETY: the texts are valid during the call; the file is closed once, and not used
         // afterwards.
         unsafe {

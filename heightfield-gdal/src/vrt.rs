@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::file_system::PREFIX;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::settings;
 use crate::xml::{self, Text};
 
@@ -47,7 +47,7 @@ pub(crate) fn too_large() -> String {
 }
 
 pub(crate) fn too_deep(depth: u32) -> String {
-    format!("VRTs lie in each other {depth} deep")
+    format!("VRTs are nested {depth} deep")
 }
 
 /// Returns all texts in a VRT that may be file names, also in embedded VRTs. Most others are
@@ -55,8 +55,8 @@ pub(crate) fn too_deep(depth: u32) -> String {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
-pub(crate) fn names(library: &Loaded, text: &str) -> Result<Vec<Text>, Error> {
-    // GDAL stops at a zero byte, too.
+pub(crate) fn names(library: &Libgdal, text: &str) -> Result<Vec<Text>, Error> {
+    // GDAL also stops at a zero byte.
     let mut texts = vec![text.replace('\0', " ")];
     let mut names = Vec::new();
     while let Some(text) = texts.pop() {
@@ -126,7 +126,7 @@ impl Text {
         };
         if self.is_file_name() && !is_neighbour || self.parts().any(is_here) {
             return Err(format!(
-                "it names {} on this computer: name what lies beside it (relativeToVRT=\"1\")",
+                "it names {} on this computer: name files relative to it (relativeToVRT=\"1\")",
                 self.shown()
             ));
         }

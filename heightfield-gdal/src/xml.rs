@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::functions::XmlNode;
-use crate::loaded::Loaded;
+use crate::libgdal::Libgdal;
 use crate::text::{from_c, to_c};
 
 /// `CXT_Text` and `CXT_Attribute`.
@@ -24,7 +24,7 @@ pub(crate) struct Text {
 ///
 /// # Errors
 /// [`Error::Refused`], [`Error::ZeroByte`].
-pub(crate) fn texts(library: &Loaded, xml: &str) -> Result<Vec<Text>, Error> {
+pub(crate) fn texts(library: &Libgdal, xml: &str) -> Result<Vec<Text>, Error> {
     let xml = to_c(xml)?;
     let functions = &library.functions;
     let mut texts = Vec::new();

@@ -78,7 +78,7 @@ fn windows_and_buffers_of_wrong_size_are_refused() {
     let error = dataset.band(2).err().map(|error| error.to_string());
     assert_eq!(
         error.as_deref(),
-        Some("there is no band 2: the file has band 1 alone")
+        Some("there is no band 2: the file has only band 1")
     );
     assert!(dataset.band(0).is_err());
 }

@@ -198,8 +198,8 @@ mod tests {
         );
     }
 
-    /// Against PROJ 9.5 (pyproj), from the datum's own degrees, by `tests/data/epsg_places.py`: a place
-    /// of every twentieth projected system.
+    /// Against PROJ 9.5 (pyproj), from the datum's own degrees, by `tests/data/epsg_places.py`: a
+    /// place of every twentieth projected system.
     #[test]
     fn codes_have_the_positions_of_proj() {
         let places = include_str!("crs/places.txt").lines().skip(1);
@@ -246,7 +246,7 @@ mod tests {
             (a.0 - b.0).abs() < 1e-9 && (a.1 - b.1).abs() < 1e-9,
             "{a:?} {b:?}"
         );
-        let remark = feet.other_unit().expect("said");
+        let remark = feet.other_unit().expect("reported");
         assert!(
             remark.contains("0.3048006") && metres.other_unit().is_none(),
             "{remark}"

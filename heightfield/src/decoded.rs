@@ -113,7 +113,7 @@ impl Decoded {
                 declared.filter(|declared| (declared / system.metres - 1.0).abs() > 1e-9)
             {
                 self.remarks.push(format!(
-                    "unit of heights: the file states units of {declared} m, and {}, which counts in units of {} m; the former is taken (--input height-unit=…)",
+                    "unit of heights: the file states units of {declared} m, and {}, which counts in units of {} m; the former is used (--input height-unit=…)",
                     system.name, system.metres
                 ));
             }
@@ -201,7 +201,7 @@ impl Decoded {
             && columns.checked_mul(rows) != u64::try_from(samples.len()).ok()
         {
             return Err(RasterError::damaged(format!(
-                "{} samples where {columns} × {rows} were promised",
+                "{} samples where {columns} × {rows} are stated",
                 samples.len()
             )));
         }

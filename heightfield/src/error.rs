@@ -41,7 +41,7 @@ pub enum RasterError {
     #[error("cannot read the file: {0}")]
     Unreadable(std::io::Error),
     /// A URL that cannot be read, perhaps only at present.
-    #[error("cannot read what is there: {0}")]
+    #[error("cannot read the URL's content: {0}")]
     Remote(std::io::Error),
     /// Neither content nor extension identifies the format.
     #[error("unknown file format")]
@@ -58,9 +58,9 @@ pub enum RasterError {
     #[error("{0}")]
     ByGdal(heightfield_gdal::Error),
     /// Raw samples carry no header, and none was stated.
-    #[error("raw samples, but nothing says how many: no size was stated")]
+    #[error("raw samples without a stated size")]
     RawSizeMissing,
-    /// The format is known, but not this variant.
+    /// The format is supported, but not this variant.
     #[error("{format}: {feature} is not supported")]
     Unsupported {
         /// Name of the format.
@@ -74,7 +74,7 @@ pub enum RasterError {
     /// Neither heights nor data that can be converted into heights.
     #[error("not a height field: {0}")]
     NoNumbers(String),
-    /// Several parts could hold the heights; none was chosen.
+    /// Several parts could be the heights; none was chosen.
     #[error("several {kind}s may be the heights: {}", names.join(", "))]
     SeveralHeights {
         /// The file's word for a part, as `raster`.
@@ -90,7 +90,7 @@ pub enum RasterError {
         /// Number of bands.
         bands: u16,
     },
-    /// The user chose a band or variable that is not there.
+    /// The user chose a band or variable that does not exist.
     #[error("there is no {requested}: {available}")]
     NoSuchPart {
         /// The request.
@@ -98,7 +98,7 @@ pub enum RasterError {
         /// The available parts.
         available: String,
     },
-    /// The user gave a cell size, but the file states another.
+    /// The user stated a cell size, but the file states another.
     #[error("the file states its own cell size: {0}")]
     CellSizeStated(String),
     /// A colour picture that looks as if its colours encoded heights.
@@ -108,10 +108,10 @@ pub enum RasterError {
     })]
     EncodedPicture(Encoding),
     /// Samples whose header is a separate file, which is missing.
-    #[error("its header is missing: no {0} lies beside it")]
+    #[error("its header is missing: there is no {0} beside it")]
     HeaderMissing(String),
     /// A valid file with more samples than fit in memory.
-    #[error("too large: {columns} × {rows} samples would take {gigabytes} GB of memory")]
+    #[error("too large: {columns} × {rows} samples would require {gigabytes} GB of memory")]
     TooLarge {
         /// Samples from west to east.
         columns: u64,
@@ -124,7 +124,9 @@ pub enum RasterError {
     #[error("not a height field: {0}")]
     AmbiguousChannels(String),
     /// Too few samples for a patch.
-    #[error("too small: {columns} × {rows} samples; a surface needs at least two samples each way")]
+    #[error(
+        "too small: {columns} × {rows} samples; a surface needs at least two samples in each direction"
+    )]
     TooSmall {
         /// Samples from west to east.
         columns: u64,
@@ -179,7 +181,7 @@ pub enum RasterError {
     },
     /// Two of many files with different heights at the same samples.
     #[error(
-        "two rasters lie at one place and differ by up to {difference}: {} and {}",
+        "two rasters cover the same place and differ by up to {difference}: {} and {}",
         without_key(&files[0]),
         without_key(&files[1])
     )]
@@ -189,7 +191,7 @@ pub enum RasterError {
         /// The max difference found.
         difference: f64,
     },
-    /// The header states more than the file can hold, or than fits in memory.
+    /// The header states more than the file can contain, or than fits in memory.
     #[error("absurd size in the header: {0}")]
     AbsurdSize(String),
     /// The file ends too early.
@@ -199,7 +201,7 @@ pub enum RasterError {
     #[error("damaged file: {0}")]
     Damaged(String),
     /// A third-party decoder does not support it.
-    #[error("not understood: {0}; the file is damaged, or of a kind that is not known here")]
+    #[error("not understood: {0}; the file is damaged or of an unsupported kind")]
     Unfamiliar(String),
     /// A third-party decoder panicked.
     #[error("the {0} decoder failed: the file is damaged or of an unsupported kind")]
@@ -220,7 +222,7 @@ impl RasterError {
         }
     }
 
-    /// Returns true if a retry may succeed: the error says nothing about the file's samples.
+    /// Returns true if a retry may succeed: the error is not about the file's samples.
     pub(super) fn is_connection_error(&self) -> bool {
         match self {
             Self::Remote(error) => !is_missing(error),

@@ -3,7 +3,7 @@
 /// The layout of a file's samples, as far as its format states it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileLayout {
-    /// Number of bands, one of which holds the heights.
+    /// Number of bands, one of which is the heights.
     pub bands: u32,
     /// Columns and rows of a strip, tile or block; `None` if the file stores row after row.
     pub block: Option<[u32; 2]>,

@@ -1,4 +1,4 @@
-//! Filled heights against a simple reference over a whole array, for each way to read the file.
+//! Filled heights against a simple reference over a whole array, for each reader of the file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -68,7 +68,7 @@ fn reference(all: &[Vec<Option<f64>>], column: usize, row: usize, within: usize)
     (weights > 0.0).then(|| heights / weights)
 }
 
-/// Writes float samples with a header; GDAL reads this format, too.
+/// Writes float samples with a header; GDAL also reads this format.
 fn write_flt(folder: &Path) -> PathBuf {
     let places = (0..SIZE[1]).flat_map(|row| (0..SIZE[0]).map(move |column| (column, row)));
     let value = |(column, row)| stored(column, row).unwrap_or(NO_DATA).to_le_bytes();

@@ -34,7 +34,7 @@ pub(super) enum Claim {
     Certain,
     /// The file should be of this format, but is damaged.
     Expected,
-    /// No conclusion: other formats use the extension, too.
+    /// No conclusion: other formats also use the extension.
     Possible,
 }
 

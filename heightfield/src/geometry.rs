@@ -150,7 +150,7 @@ pub struct VerticalDatum {
 pub(super) fn unknown_unit(name: &str) -> String {
     let name = beginning(name);
     format!(
-        "it states the unit of heights '{name}', which is not known here (--input height-unit=…)"
+        "it states the unit of heights '{name}', which is not supported (--input height-unit=…)"
     )
 }
 

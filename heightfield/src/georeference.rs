@@ -111,7 +111,8 @@ pub enum System {
     /// The file states no place: coordinates are sample columns and rows, counted from the
     /// south-west sample.
     Cells,
-    /// Lengths or angles of a reference system that is not stated or whose projection is not known.
+    /// Lengths or angles of a reference system that is not stated or whose projection is not
+    /// supported.
     Unstated,
     /// Longitude and latitude.
     Geographic {

@@ -201,9 +201,7 @@ impl FileBytes {
     pub(super) fn read_at(&self, at: u64, count: u64) -> Result<Vec<u8>, RasterError> {
         let is_inside = at.checked_add(count).is_some_and(|end| end <= self.len);
         let (true, Ok(capacity)) = (is_inside, usize::try_from(count)) else {
-            return Err(RasterError::Truncated(
-                "it ends before its samples do".into(),
-            ));
+            return Err(RasterError::Truncated("it ends within its samples".into()));
         };
         let read = match &self.data {
             Data::File(file, _) => {
@@ -227,8 +225,8 @@ impl FileBytes {
         Ok(head)
     }
 
-    /// Checks, before memory is allocated, that the file's bytes can hold the samples at deflate's
-    /// max ratio.
+    /// Checks, before memory is allocated, that the file's bytes can contain the samples at
+    /// deflate's max ratio.
     ///
     /// # Errors
     /// [`RasterError::AbsurdSize`].

@@ -37,7 +37,7 @@
 //! read by `beside`.
 //!
 //! **No-data** is the format's no-data value, NaN, masked samples and missing tiles of a sparse
-//! file: [`Raster::height`] is NaN there. Samples beyond [`MAX_HEIGHT`] are no-data too, with a
+//! file: [`Raster::height`] is NaN there. Samples beyond [`MAX_HEIGHT`] are also no-data, with a
 //! remark. With [`OpenOptions::fill`], no-data near data gets a height.
 
 #![forbid(unsafe_code)]
@@ -391,7 +391,7 @@ impl Raster {
     /// Returns the height at a position in columns and rows of level 0, bilinear between samples;
     /// NaN outside the field, and if a corner with a weight has no height.
     ///
-    /// A raster in memory has one image for all levels. A raster in its file takes level *L* from
+    /// A raster in memory has one image for all levels. A raster in its file reads level *L* from
     /// the coarsest overview that is no coarser than *L*; without overviews, and for *L* of 3 or
     /// more, from every 8th, 64th or 512th sample.
     pub fn surface(&self, level: u8, place: [f64; 2]) -> f64 {

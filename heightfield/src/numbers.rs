@@ -70,7 +70,7 @@ pub(super) fn no_data(text: &str, band: usize, bands: usize) -> NoDataText {
     let value = words.get(own).and_then(|word| number(word));
     let text = beginning(text);
     let remark = match value {
-        Some(value) => format!("its no-data value is the text '{text}': {value} is taken"),
+        Some(value) => format!("its no-data value is the text '{text}': {value} is used"),
         None => format!(
             "its no-data value is the text '{text}', which is no number: it is not used (state it: --input no-data=VALUE)"
         ),

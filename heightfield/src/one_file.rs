@@ -103,7 +103,7 @@ fn decode_as(
     guarded(format.name, || (format.decode)(input, options))
 }
 
-/// Checks that no open option is given for a file that is read without GDAL.
+/// Checks that no open option is set for a file that is read without GDAL.
 fn check_no_open_options(format: &str, options: &OpenOptions) -> Result<(), RasterError> {
     match &options.open_options[..] {
         [] => Ok(()),
@@ -125,7 +125,7 @@ fn by_extension(extension: &str) -> Result<&'static Format, RasterError> {
     match claims.next() {
         Some((format, Claim::Certain)) => Ok(format),
         Some((format, Claim::Expected)) => Err(RasterError::Unfamiliar(format!(
-            "its name says {}, its content does not begin like one",
+            "its name is that of {}, its content does not begin like one",
             format.name
         ))),
         _ if raw::EXTENSIONS.contains(&extension) => Err(RasterError::RawSizeMissing),

@@ -10,19 +10,19 @@ use crate::remote::RemoteFetcher;
 pub struct OpenOptions {
     /// The file is raw samples in this layout, whatever its content.
     pub raw: Option<RawLayout>,
-    /// The channel of a PNG that holds the height. By default: grey in a grey picture, alpha in a
-    /// colour picture whose alpha varies.
+    /// The channel of a PNG that contains the height. By default: grey in a grey picture, alpha in
+    /// a colour picture whose alpha varies.
     pub png_channel: Option<PngChannel>,
     /// Stored sample value that means no-data; overrides the file's.
     pub no_data: Option<f64>,
     /// Distance within which no-data is filled from data. By default, and with
     /// [`OpenOptions::classes`], it stays no-data.
     pub fill: Option<Fill>,
-    /// The band that holds the height, the first being 1. By default: the first.
+    /// The band that contains the height, the first being 1. By default: the first.
     pub band: Option<u32>,
-    /// The raster that holds the height, if there are several: a variable of a NetCDF file, a file
-    /// of an archive, an asset of STAC items. By default: the one with a usual name for heights, or
-    /// the only one.
+    /// The raster that contains the height, if there are several: a variable of a NetCDF file, a
+    /// file of an archive, an asset of STAC items. By default: the one with a usual name for
+    /// heights, or the only one.
     pub variable: Option<String>,
     /// Options of the GDAL driver that opens the file, each as `NAME=VALUE`.
     pub open_options: Vec<String>,
@@ -106,7 +106,7 @@ pub enum PngChannel {
     Green,
     /// Blue
     Blue,
-    /// Alpha, which holds the height in the paper's data
+    /// Alpha, which contains the height in the paper's data
     Alpha,
 }
 

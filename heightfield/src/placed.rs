@@ -78,7 +78,7 @@ fn turned(map: &GroundMap) -> Vec<String> {
 }
 
 impl Decoded {
-    /// Returns the unit of the coordinates after `set_layout`; `None` if it was guessed.
+    /// Returns the unit of the coordinates after `set_layout`; `None` if it was inferred.
     pub(super) fn ground_unit(&self) -> Option<GroundUnit> {
         let (cell, place) = (self.cell?, self.place?);
         let is_guess = cell.certainty == Certainty::Assumed && self.system.is_none();
@@ -90,7 +90,8 @@ impl Decoded {
     }
 
     /// Sets orientation, cell and place. If the file states no `unit`, the unit of its reference
-    /// system is used, which must be set before; without one, the unit is guessed from the numbers.
+    /// system is used, which must be set before; without one, the unit is inferred from the
+    /// numbers.
     pub(super) fn set_layout(&mut self, map: GroundMap, unit: Option<GroundUnit>) {
         self.south_up = map.is_south_up();
         self.east_first = map.is_east_first();
@@ -109,7 +110,7 @@ impl Decoded {
     /// Adds a remark on positions of single samples, which do not define a grid.
     pub(super) fn remark_control_points(&mut self, count: usize) {
         self.remarks.push(format!(
-            "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; this brings it onto a map: gdalwarp -r bilinear IN OUT.tif"
+            "it states the places of {count} samples (tie points, ground control points) and no cell size: they are not used; georeference it: gdalwarp -r bilinear IN OUT.tif"
         ));
     }
 

@@ -81,7 +81,7 @@ impl RawSamples {
     /// blocks.
     ///
     /// # Errors
-    /// A file that cannot be read; more samples than memory holds.
+    /// A file that cannot be read; more samples than fit in memory.
     pub(super) fn storage(
         self,
         input: &FileBytes,

@@ -158,7 +158,7 @@ fn blockwise_and_in_memory_heights_match_on_all_levels() {
     }
 }
 
-/// A header may say that a file begins in the south or in the east.
+/// A header may state that a file begins in the south or in the east.
 #[test]
 fn levels_count_from_south_west_in_any_file_order() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -38,14 +38,14 @@ impl StoredType {
     }
 
     /// Returns an empty vector with capacity for `count` samples; the caller has checked that the
-    /// file holds them.
+    /// file contains them.
     pub(super) fn reserve(self, count: u64) -> Result<Samples, RasterError> {
         let mut samples = self.memory_type().none();
         let reserved = usize::try_from(count).ok().and_then(
             |count| with_samples!(&mut samples, values => values.try_reserve_exact(count).ok()),
         );
         reserved.ok_or_else(|| {
-            RasterError::AbsurdSize(format!("{count} samples are more than memory can hold"))
+            RasterError::AbsurdSize(format!("{count} samples do not fit into memory"))
         })?;
         Ok(samples)
     }

@@ -97,7 +97,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let pipe = folder.path().join("pipe");
         mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR, 0).expect("a pipe");
-        // If it were opened, this test would wait for ever.
+        // If it were opened, this test would wait indefinitely.
         for (path, what) in [
             (&*pipe, "a pipe (FIFO)"),
             (Path::new("/dev/zero"), "a character device"),

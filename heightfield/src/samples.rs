@@ -147,7 +147,7 @@ impl Endian {
     }
 }
 
-/// One sample of a type that [`Samples`] can hold.
+/// One sample of a type that [`Samples`] can contain.
 pub(super) trait SampleValue: Copy {
     /// Converts to `f64`, exactly.
     fn widen(self) -> f64;

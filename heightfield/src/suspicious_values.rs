@@ -62,7 +62,7 @@ impl Outermost {
         let mut remarks = Vec::new();
         if self.beyond > 0 {
             remarks.push(format!(
-                "{} of its samples are infinite or beyond ±1e30, which no height is: they count as no data",
+                "{} of its samples are infinite or beyond ±1e30, which are no heights: they count as no data",
                 self.beyond
             ));
         }

@@ -11,7 +11,8 @@
 //! - [`link`]: the terrain served to a device, tile by tile;
 //! - [`serving`]: that session from its first message to its confirmed end;
 //! - [`phantom`]: a virtual Phantom in the hand of a scripted user;
-//! - [`stability`]: the stiffness above which a hand on that Phantom feels the ticks;
+//! - [`stability`]: the stiffness above which sampling becomes unstable in a hand on that Phantom;
+//! - [`quantity`]: numbers with units, as an option or a command states them;
 //! - [`published`]: the paper's algorithm, for comparison;
 //! - [`replay`]: a trajectory rendered in lock-step, and recordings;
 //! - [`place`]: a terrain's position in front of the arm, and its size;
@@ -50,6 +51,7 @@ pub mod phantom;
 pub mod picture;
 pub mod place;
 pub mod published;
+pub mod quantity;
 pub mod replay;
 pub mod serving;
 pub mod stability;

@@ -51,7 +51,7 @@ impl Output {
         };
         let opened = match std::fs::metadata(path) {
             _ if is_standard_output(path) => Err(io::Error::other(
-                "it stands for standard output, where this command says how it goes",
+                "it is standard output, where this command prints its progress",
             )),
             Ok(there) if there.is_dir() => Err(io::Error::other("it is a folder")),
             Ok(there) if !there.is_file() => {
@@ -149,7 +149,7 @@ impl Write for Output {
                 self.free_bytes = room;
                 self.writer.write(bytes)
             }
-            None => Err(io::Error::other("it has as many bytes as it may have")),
+            None => Err(io::Error::other("it has reached its maximum size")),
         };
         written.inspect_err(|_| self.keep_partial())
     }
@@ -338,6 +338,7 @@ mod tests {
         assert_eq!(entries(), 1);
     }
 
+    /// Safety: 27.
     #[test]
     fn recording_that_cannot_grow_is_kept() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -109,7 +109,7 @@ fn fine_texture_warning(texture: &Texture, rate: TickRate) -> Option<String> {
     let whole_mm_s = wavelength * hz as f32 / 8.0;
     (!texture.is_none() && wavelength < shortest).then(|| {
         format!(
-            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is gone at twice that; from {shortest} mm on it is rendered in full for a slow hand"
+            "a texture with a wavelength of {wavelength} mm: at {hz} ticks a second it fades from {whole_mm_s:.0} mm/s on, and is zero at twice that; from {shortest} mm on it is rendered in full for a slow hand"
         )
     })
 }

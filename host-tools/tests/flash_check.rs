@@ -46,6 +46,8 @@ fn image_fits_only_its_board() {
 }
 
 /// A foreign checkout around the working folder is not built, because a build runs its code.
+///
+/// Safety: 37.
 #[cfg(unix)]
 #[test]
 fn own_checkout_is_built_from_any_folder() {

@@ -1,4 +1,4 @@
-// The arm and the hand that holds it.
+// The arm and the hand.
 //
 // The hand is the pointer. It pulls the arm sideways through a spring and a damper, and presses
 // straight down with a constant force. The arm is a small mass: the ground's force pushes it back,

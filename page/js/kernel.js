@@ -39,7 +39,7 @@ export class Kernel {
 
   #alloc(bytes) {
     const at = this.#c.hapterra_alloc(bytes);
-    if (at === 0) throw new Error(`There is no memory for ${bytes} bytes. Close other pages, or take a smaller terrain.`);
+    if (at === 0) throw new Error(`There is no memory for ${bytes} bytes. Close other pages, or use a smaller terrain.`);
     return at;
   }
 

@@ -69,7 +69,7 @@ export function surfaceFile({ texture, wavelength }) {
 
 /** Returns the command that renders the path again, in the folder of the saved files. */
 export function command(terrain, { friction, stiffness, texture }, tipMm) {
-  const words = ["hapterra replay terrain.npy path.csv -o felt.csv"];
+  const words = ["hapterra replay terrain.npy path.csv -o forces.csv"];
   words.push(`--scale ${terrain.cellMm}mm/cell --exaggeration 1mm/unit`);
   words.push(`--stiffness ${stiffness} --friction ${friction}`);
   if (texture > 0) words.push("--surface surface.toml");

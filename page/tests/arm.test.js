@@ -16,7 +16,7 @@ test("clock runs a thousand ticks a second at any frame rate", () => {
   }
 });
 
-test("clock gives late time up and counts it", () => {
+test("clock drops late time and counts it", () => {
   const clock = new Clock();
   clock.ticks(0);
   assert.equal(clock.ticks(300), MAX_TICKS);

@@ -15,7 +15,7 @@ test("path keeps every bit in CSV", () => {
   assert.deepEqual(lines.at(-1).split(",").map(Number), [10, ...at, ...force]);
 });
 
-test("path ends after five minutes and begins anew when cleared", () => {
+test("path ends after five minutes and starts again when cleared", () => {
   const path = new Path();
   for (let i = 0; i < MAX_ROWS + 5; i++) path.add([i, 0, 0], [0, 0, 0]);
   assert.ok(path.isFull);

@@ -50,9 +50,9 @@ test("png of 8 bits and hgt are read", async () => {
   [76_762, 111_161].forEach((metres, axis) => assert.ok(Math.abs(hgt.cellM[axis] - metres) < 5, `${hgt.cellM}`));
 });
 
-test("bad file is named with what to do", async () => {
+test("error of a bad file names the file and a remedy", async () => {
   const bad = [
-    ["a.txt", bytes("hello"), /its kind is not known.*cargo xtask demo/],
+    ["a.txt", bytes("hello"), /its format is not supported.*cargo xtask demo/],
     ["a.hgt", new Uint8Array(6), /6 bytes are no square.*unpacked/],
     ["a.npy", npy("<f4", "2, 3", [0, 0]), /cut off.*Copy it again/],
     ["a.npy", npy("<c8", "2, 3", []), /type c8.*32-bit floats/],

@@ -56,7 +56,7 @@ def jnd_of(reversals):
     """Returns the JND: the geometric mean of equally many upper and lower reversals after the
     first."""
     if len(reversals) < LEFT_OUT + 2:
-        raise SystemExit(f"only {len(reversals)} reversals: give more --trials")
+        raise SystemExit(f"only {len(reversals)} reversals: use more --trials")
     return statistics.geometric_mean(reversals[LEFT_OUT + len(reversals) % 2 :])
 
 
@@ -105,7 +105,7 @@ def person(device):
     def judge(first, second):
         while not (feels(1, first) and feels(2, second)):
             device.mark("repeated")
-            print("The force went out: once more from the first stroke.")
+            print("The force was lost: repeat from the first stroke.")
         answer = ""
         while answer not in ("1", "2"):
             answer = input("Which had more friction, 1 or 2? ").strip()

@@ -124,7 +124,7 @@ impl Contact {
         self.contact.try_lock().map_err(|error| {
             PyRuntimeError::new_err(match error {
                 TryLockError::WouldBlock => {
-                    "this contact runs in another thread: give each thread its own"
+                    "this contact runs in another thread: use a contact for each thread"
                 }
                 TryLockError::Poisoned(_) => {
                     "a fault of hapterra ended this contact: make another, and report the fault"

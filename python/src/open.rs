@@ -102,7 +102,7 @@ impl Opened {
             let (size, last) = (size_mm[axis], f64::from(reopened.samples[axis] - 1));
             if !(size.is_finite() && size >= cell_mm) {
                 return Err(refused(format!(
-                    "size_mm is {size_mm:?}: give device millimetres, a cell of {cell_mm} at least"
+                    "size_mm is {size_mm:?}: use device millimetres, a cell of {cell_mm} at least"
                 )));
             }
             let begin = ((middle[axis] - 0.5 * size) / cell_mm + 0.5).floor();
@@ -260,7 +260,9 @@ impl Heights for Part {
         *count += 1;
         match raster.check_complete() {
             Err(error) => *why = text(&error.into()),
-            Ok(()) if why.is_empty() => *why = "the heights are not here yet: try again".to_owned(),
+            Ok(()) if why.is_empty() => {
+                *why = "the heights have not arrived yet: try again".to_owned()
+            }
             Ok(()) => {}
         }
         Err(Unread(0))

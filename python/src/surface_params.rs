@@ -179,7 +179,7 @@ fn choice<T: Copy, const COUNT: usize>(
     let found = names.iter().find(|(name, _)| *name == given);
     found.map(|(_, of)| *of).ok_or_else(|| {
         let names = names.map(|(name, _)| format!("{name:?}")).join(" or ");
-        refused(format!("{what} is {given:?}: give {names}"))
+        refused(format!("{what} is {given:?}: use {names}"))
     })
 }
 

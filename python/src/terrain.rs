@@ -77,7 +77,7 @@ impl Terrain {
                 "u2" => samples.terrain(u16::from_ne_bytes),
                 "i1" => samples.terrain(i8::from_ne_bytes),
                 "u1" => samples.terrain(u8::from_ne_bytes),
-                other => Err(refused(format!("samples of {other}: give f8"))),
+                other => Err(refused(format!("samples of {other}: use f8"))),
             }?;
             let terrain = terrain.with_height_scale(height_mm_per_unit);
             let terrain = terrain.map_err(refused)?;

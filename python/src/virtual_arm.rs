@@ -14,7 +14,7 @@ use crate::{notes, refused};
 /// Bytes of a row: `ARM_STEP` of `package/hapterra/_virtual_arm.py`.
 const ROW: usize = 104;
 
-/// A Premium 1.5 and the hand that holds it.
+/// A Premium 1.5 and the hand.
 #[pyclass(frozen, module = "hapterra._native")]
 pub(crate) struct VirtualArm {
     hand: HandModel,
@@ -24,7 +24,7 @@ pub(crate) struct VirtualArm {
 
 #[pymethods]
 impl VirtualArm {
-    /// Takes the terrain point at the tip in the arm's home pose, mm, and the hand's `HandModel`:
+    /// Creates an arm from the terrain point at its tip in the home pose, mm, and a `HandModel`:
     /// kg, N/m and N·s/m towards the target, the same for the grip.
     #[new]
     fn new(home_mm: [f64; 3], hand: [f64; 5]) -> PyResult<Self> {

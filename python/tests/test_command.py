@@ -1,4 +1,4 @@
-"""The command that comes with the package."""
+"""The command of the package."""
 
 import os
 import signal
@@ -31,7 +31,7 @@ def test_console_script_and_module_are_the_command(package_command):
     assert run("--version") == result.stdout
 
 
-def test_command_is_what_the_environment_names(monkeypatch, package_command):
+def test_command_is_named_by_the_environment(monkeypatch, package_command):
     assert command() == OWN
     monkeypatch.setenv("HAPTERRA", "/opt/hapterra")
     assert command() == ["/opt/hapterra"]
@@ -114,7 +114,7 @@ def test_killed_worker_is_reported_by_its_guardian(tmp_path):
             os.kill(int(worker), signal.SIGKILL)
         result = child.communicate()[1]
     assert len(workers) == 1 and child.returncode == 128 + signal.SIGKILL, result
-    assert "felt.csv" in result and "is what was written of it" in result
+    assert "felt.csv" in result and "is incomplete" in result
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no SIGINT there")

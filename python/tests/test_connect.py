@@ -256,7 +256,7 @@ def ends_early(record):
     """Waits until the recording of a session is complete that ended before the end of its tour."""
     until = time.monotonic() + 120
     while not record.exists():
-        assert time.monotonic() < until, "the session goes on"
+        assert time.monotonic() < until, "the session continues"
         time.sleep(0.05)
     rows = rows_of(record)
     assert rows["mode"][-1] == "armed" and float(rows["t_s"][-1]) < TOUR_S
@@ -609,7 +609,7 @@ def test_ctrl_c_while_it_ends_does_not_lose_the_session(played, monkeypatch):
 
 
 @posix
-def test_mode_and_view_come_from_samples_too():
+def test_samples_update_mode_and_view():
     session = fake_session()
     session._handle_event({"event": "sample", "mode": "armed", "view": 3})
     assert (session.mode, session.view) == ("armed", 3)
@@ -648,7 +648,7 @@ def test_closed_stderr_and_half_a_line_keep_the_session(played, monkeypatch):
 @pytest.mark.parametrize("quiet", [False, True])
 def test_quiet_session_forwards_warnings(capsys, quiet):
     lines = ["view 1: friction 0.6", "mark           `a` at tick 7", "  12.0 s free",
-             "error: another host has taken the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
+             "error: another host controls the device", "  DEAD_MAN_RELEASED: press it"]  # fmt: skip
     session = fake_session(code=line_of("\n".join(lines)), is_quiet=quiet)
     session.end() if quiet else session._stderr.join()
     result = capsys.readouterr().err.splitlines()
@@ -680,7 +680,7 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
         device.arm()
         params = device.params
         for line in ("stiffness 2", " damping 1", "at 2 reset", "on 1 friction 0.2", "enter 7"):
-            with pytest.raises(DeviceError, match="not given as a command"):
+            with pytest.raises(DeviceError, match="not accepted as a command"):
                 device.command(line)
         params.stiffness = 1.0
         device.command("reset")
@@ -690,10 +690,10 @@ def test_surface_is_set_by_params_and_unknown_after_a_time_out(played, tmp_path,
         assert params.friction == pytest.approx(0.3)
         with pytest.raises(DeviceError, match="may still come"):
             params.friction = 0.2
-        with pytest.raises(DeviceError, match="friction is not known"):
+        with pytest.raises(DeviceError, match="friction is unknown"):
             params.static_friction = 0.5
         device._current_surface["stiffness"] = None
-        with pytest.raises(DeviceError, match="stiffness is not known"):
+        with pytest.raises(DeviceError, match="stiffness is unknown"):
             params.stiffness = 0.5
         device.command("reset")
         assert (params.stiffness, params.friction) == pytest.approx((0.5, 0.3))

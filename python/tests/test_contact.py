@@ -58,7 +58,7 @@ def test_path_of_any_layout_is_its_numbers(path):
 def test_bad_paths_are_errors():
     contact = Contact(FLAT)
     for path in (np.zeros(3), np.zeros((3, 2)), np.zeros((3, 3, 1))):
-        with pytest.raises(ValueError, match=r"give \(N, 3\)"):
+        with pytest.raises(ValueError, match=r"use \(N, 3\)"):
             contact.run(path)
     with pytest.raises(ValueError, match="t has the shape"):
         contact.run(DOWN, t=[0, 1])
@@ -69,7 +69,7 @@ def test_bad_paths_are_errors():
         contact.run([[1, 1, 3], [1, np.nan, 1], [1, 1, 1]])
     assert len(error.value.steps) == 1 and error.value.steps.dtype == STEP
     for rate in (1500, 0, 11_000):
-        with pytest.raises(ValueError, match="ticks a second: give 1,000 to 10,000"):
+        with pytest.raises(ValueError, match="ticks a second: use 1,000 to 10,000"):
             Contact(FLAT, rate=rate)
     with pytest.raises(TypeError, match="hapterra.Terrain"):
         Contact(np.zeros((5, 5)))
@@ -87,11 +87,11 @@ def test_times_are_sampled_at_the_tick_rate():
 def test_impossible_times_are_errors():
     path = np.array([[1.0, 1, 5], [2, 1, 5], [3, 1, 5]])
     for t, text in [
-        ([0, 1, 0.5], r"t\[2\]: time goes back from 1 s to 0.5 s"),
+        ([0, 1, 0.5], r"t\[2\]: time decreases from 1 s to 0.5 s"),
         ([0, 1, 1], r"t\[2\]: two places at 1 s"),
         ([0, 1, 4], r"t\[2\]: the HIP moves during a gap of 3 s"),
         ([0, np.nan, 1], r"t\[1\]: the time is not a finite number"),
-        ([1e15, 1e15 + 1, 1e15 + 2], "too far apart to tell ticks"),
+        ([1e15, 1e15 + 1, 1e15 + 2], "too far apart to separate ticks"),
     ]:
         with pytest.raises(ValueError, match=text):
             Contact(FLAT).run(path, t)

@@ -55,11 +55,11 @@ def test_units_and_exaggeration_scale_the_heights():
     same(Terrain.from_xarray(km, cell_mm=0.5, exaggeration=3), mm_per_unit=0.05)
     bare = array(units={})
     del bare.attrs["units"]
-    with pytest.raises(ValueError, match='unit of its coordinates: give ground_unit="m"'):
+    with pytest.raises(ValueError, match='unit of its coordinates: pass ground_unit="m"'):
         Terrain.from_xarray(bare, cell_mm=0.5)
-    with pytest.raises(ValueError, match='unit of its heights: give height_unit="m"'):
+    with pytest.raises(ValueError, match='unit of its heights: pass height_unit="m"'):
         Terrain.from_xarray(bare, cell_mm=0.5, ground_unit="m")
-    with pytest.raises(ValueError, match="height_unit is 'furlong': give one of m, km"):
+    with pytest.raises(ValueError, match="height_unit is 'furlong': use one of m, km"):
         Terrain.from_xarray(bare, cell_mm=0.5, ground_unit="m", height_unit="furlong")
     same(Terrain.from_xarray(bare, cell_mm=0.5, ground_unit="metre", height_unit="m"))
     same(Terrain.from_xarray(bare, cell_mm=0.5, height_mm_per_unit=0.1), mm_per_unit=0.1)

@@ -86,7 +86,7 @@ def test_scale_is_ground_for_a_millimetre(tmp_path):
     assert 14 < relief < 16
 
 
-def test_what_the_file_states_is_reported(tmp_path):
+def test_metadata_of_the_file_is_reported(tmp_path):
     source = Terrain.open(written(tmp_path / "hills.tif")).source
     assert source["file"] == str(tmp_path / "hills.tif")
     assert source["crs"] == "EPSG:32633" and source["height_unit_m"] == "1"
@@ -98,10 +98,10 @@ def test_bad_words_have_the_text_of_the_command(tmp_path):
     for error, text, path, words in [
         (FileNotFoundError, "none.tif.*\nhint: check the path", tmp_path / "none.tif", {}),
         (ValueError, "there is no band 7.*\nhint: name one that is there", file, {"band": 7}),
-        (ValueError, "invalid value 'bnd=1' .*known are raw=", file, {"bnd": 1}),
+        (ValueError, "invalid value 'bnd=1' .*supported are raw=", file, {"bnd": 1}),
         (ValueError, "m, ft, us-ft", file, {"height_unit": "furlong"}),
         (ValueError, "cannot be used with", file, {"cell_mm": 1, "scale": 2}),
-        (ValueError, 'give ground a millimetre, as "100 m/mm"', file, {"scale": "100"}),
+        (ValueError, 'use ground per millimetre, as "100 m/mm"', file, {"scale": "100"}),
         (ValueError, "a cell of -1 mm", file, {"cell_mm": -1}),
         (ValueError, "-1 ground metres per device millimetre", file, {"scale": -1}),
         (ValueError, "hint: choose another --exaggeration", file, {"exaggeration": 0}),
@@ -237,7 +237,7 @@ def test_window_ends_with_the_terrain(tmp_path):
     assert whole.place(whole.ground_at(60, 40), size_mm=(1e9, 1e9)).shape == whole.shape
 
 
-def test_places_are_longitude_and_latitude_too(tmp_path):
+def test_places_are_also_longitude_and_latitude(tmp_path):
     terrain = Terrain.open(written(tmp_path / "hills.tif"), cell_mm=1)
     lonlat = terrain.ground_at(40, 30, crs="lonlat")
     assert lonlat == pytest.approx((15.0, 36.1), abs=0.1)
@@ -248,9 +248,9 @@ def test_places_are_longitude_and_latitude_too(tmp_path):
     unplaced = np.save(tmp_path / "hills.npy", hills()) or Terrain.open(tmp_path / "hills.npy")
     assert unplaced.mm_at(3, 4) == (3, 4)
     for call in (lambda: unplaced.mm_at(7, 45, "lonlat"), lambda: unplaced.ground_at(7, 45, "lonlat")):
-        with pytest.raises(ValueError, match="hint: give the place in the file's own coordinates"):
+        with pytest.raises(ValueError, match="hint: state the place in the file's own coordinates"):
             call()
-    with pytest.raises(ValueError, match="crs is 'EPSG:4326': give \"lonlat\""):
+    with pytest.raises(ValueError, match="crs is 'EPSG:4326': use \"lonlat\""):
         terrain.mm_at(7, 45, "EPSG:4326")
 
 
@@ -263,7 +263,7 @@ def test_impossible_places_are_errors(tmp_path):
         ((501_500, 3_998_500), (9, 9), "there is no data at"),
         ((500_100, 3_999_000), (0, 9), "size_mm is"),
         ((500_100, 3_999_000), (9, np.nan), "size_mm is"),
-        ((500_100,), (9, 9), "at has 1 numbers: give 2"),
+        ((500_100,), (9, 9), "at has 1 numbers: pass 2"),
     ]:
         with pytest.raises(ValueError, match=text):
             terrain.place(at, size_mm=size)
@@ -288,7 +288,7 @@ def test_arrays_with_coordinates_have_places(tmp_path, flip):
     for bad, text in [((0, 0), "outside"), (at, "size_mm")]:
         with pytest.raises(ValueError, match=text):
             array.place(bad, size_mm=(0, 5))
-    with pytest.raises(ValueError, match="take Terrain.open"):
+    with pytest.raises(ValueError, match="use Terrain.open"):
         array.mm_at(*at, crs="lonlat")
     with pytest.raises(ValueError, match="an array without coordinates"):
         Terrain(hills(), cell_mm=1).place(at, size_mm=(9, 9))

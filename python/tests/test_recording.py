@@ -47,7 +47,7 @@ def test_both_forms_have_the_same_columns(recorded):
     assert "touching" in set(csv.steps["state"])
 
 
-def test_settings_are_what_was_recorded(recorded):
+def test_settings_are_the_recorded_ones(recorded):
     for recording in map(read_recording, recorded):
         settings = recording.settings
         assert settings["terrain"]["file"].endswith("hills.tif")
@@ -123,5 +123,5 @@ def test_other_files_are_errors(tmp_path):
     path = read_recording(tmp_path / "path.csv")
     assert path.settings == {} and len(path.steps) == 2
     assert list(path.steps["trial"]) == [1, 2.5] and list(path.steps["note"]) == ["a", "b"]
-    with pytest.raises(ValueError, match="does not say on which terrain"):
+    with pytest.raises(ValueError, match="does not name its terrain"):
         path.replay()

@@ -34,14 +34,14 @@ def test_bad_numbers_have_the_text_of_the_command():
         stability(stifness=1)
 
 
-def test_missing_program_is_named_with_what_to_install(monkeypatch):
+def test_error_of_missing_program_names_its_installation(monkeypatch):
     monkeypatch.delenv("HAPTERRA_LAB", raising=False)
     monkeypatch.setenv("PATH", "")
     with pytest.raises(CommandError, match="cargo install --locked --path bench --bin hapterra-lab"):
         stability()
 
 
-def test_without_pandas_the_error_says_what_to_install(monkeypatch):
+def test_error_without_pandas_names_the_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="to_dataframe returns a DataFrame: pip install pandas"):
         hapterra.to_dataframe(np.zeros(0, hapterra.STEP))

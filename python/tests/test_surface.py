@@ -32,21 +32,21 @@ def test_repr_makes_the_same_surface():
     assert "materials=[2 more]" in repr(Surface(materials=[surface, Surface()]))
 
 
-def test_static_friction_is_friction_unless_given():
+def test_static_friction_is_friction_unless_passed():
     assert Surface(friction=0.3) == Surface(friction=0.3, static_friction=0.3)
 
 
 def test_bad_parameters_are_named():
     for params, text in [
-        ({"stiffness": -1}, "stiffness, N/mm, is -1: give 0 to"),
+        ({"stiffness": -1}, "stiffness, N/mm, is -1: use 0 to"),
         ({"max_force": float("nan")}, "max_force, N, is NaN"),
-        ({"friction": 11}, "dynamic friction is 11: give 0 to 10"),
+        ({"friction": 11}, "dynamic friction is 11: use 0 to 10"),
         ({"friction": 0.5, "static_friction": 0.4}, "static friction is never less"),
-        ({"viscous_friction": 2}, "viscous friction, s, is 2: give 0 to 1"),
-        ({"damping": 21}, "damping, N·s/m, is 21: give 0 to 20"),
-        ({"texture": "grain", "texture_wavelength": 0}, "wavelength, mm, is 0: give 0.25 to 100"),
-        ({"shading": "phong"}, 'shading is "phong": give "none" or "smooth"'),
-        ({"texture": "sand"}, 'texture is "sand": give "none" or "grain" or "grating"'),
+        ({"viscous_friction": 2}, "viscous friction, s, is 2: use 0 to 1"),
+        ({"damping": 21}, "damping, N·s/m, is 21: use 0 to 20"),
+        ({"texture": "grain", "texture_wavelength": 0}, "wavelength, mm, is 0: use 0.25 to 100"),
+        ({"shading": "phong"}, 'shading is "phong": use "none" or "smooth"'),
+        ({"texture": "sand"}, 'texture is "sand": use "none" or "grain" or "grating"'),
         ({"materials": [Surface()] * 16}, "16 materials besides the surface itself"),
     ]:
         with pytest.raises(ValueError) as error:

@@ -15,7 +15,7 @@ def test_origin_sets_the_first_row():
     assert upper.height_mm(2, 0) == 9 and lower.height_mm(2, 0) == 1
     assert upper.height_mm(2, 4) == 1 and lower.height_mm(2, 4) == 9
     assert upper.size_mm == (6, 4) and upper.shape == (3, 4)
-    with pytest.raises(ValueError, match='origin is \'north\': give "upper"'):
+    with pytest.raises(ValueError, match='origin is \'north\': use "upper"'):
         Terrain(RAMP, cell_mm=2, origin="north")
 
 
@@ -76,11 +76,11 @@ def test_nan_is_a_hole_without_force():
 
 def test_bad_arrays_are_errors():
     for error, text, heights in [
-        (ValueError, r"shape \(3,\): give \(rows, columns\)", [1, 2, 3]),
+        (ValueError, r"shape \(3,\): use \(rows, columns\)", [1, 2, 3]),
         (ValueError, r"shape \(2, 2, 2\)", np.zeros((2, 2, 2))),
         (ValueError, "1 × 4 samples|4 × 1 samples", np.zeros((1, 4))),
         (ValueError, "0 × 3 samples|3 × 0 samples", np.zeros((3, 0))),
-        (TypeError, "complex128: give real numbers", np.zeros((3, 3), complex)),
+        (TypeError, "complex128: use real numbers", np.zeros((3, 3), complex)),
         (TypeError, "object", [[1, None], [2, 3]]),
         (TypeError, "<U1", [["1", "2"], ["3", "4"]]),
         (TypeError, "datetime64", np.zeros((2, 2), "M8[s]")),

@@ -22,7 +22,7 @@ def run_stroke(arm=None, corners=STROKE, **surface):
     return (arm or VirtualArm((50, 50, 10))).run(contact, targets, t)
 
 
-def test_hand_presses_with_what_its_springs_give():
+def test_hand_presses_with_the_force_of_its_springs():
     steps = run_stroke(corners=[STROKE[0], STROKE[1], STROKE[1]])
     assert steps.dtype == ARM_STEP and len(steps) == 1501
     assert np.array_equal(steps["tick"], np.arange(1501))
@@ -44,7 +44,7 @@ def test_friction_holds_the_hand_back():
     assert behind[0] < behind[1] < behind[2]
 
 
-def test_same_arguments_give_the_same_bits():
+def test_same_arguments_return_the_same_bits():
     assert run_stroke(friction=0.4).tobytes() == run_stroke(friction=0.4).tobytes()
     weak = VirtualArm((50, 50, 10), arm_stiffness=150, hand_mass=0.3)
     assert run_stroke(weak)["force_n"][-1, 2] < 0.8 * run_stroke()["force_n"][-1, 2]

@@ -160,7 +160,7 @@ fn compare(source: &str, shown: &str, root: &Path) -> Result<(), String> {
     match is_rounded(shown, recorded) {
         Some(true) => Ok(()),
         Some(false) => Err(format!(
-            "{source}: the page says {shown}, the table {recorded}"
+            "{source}: {shown} on the page, {recorded} in the table"
         )),
         None => Err(format!(
             "{source}: no figure behind the comment, but {shown:?}"

@@ -31,6 +31,7 @@ pub mod socket_device;
 mod terrain_file;
 pub mod tiffs;
 pub mod timeouts;
+pub mod traceability;
 pub mod usb;
 pub mod whole_field;
 
@@ -50,6 +51,19 @@ pub fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("the tests package is inside the repository")
+}
+
+/// Returns the newest file of this name in `log/`, which has a folder for each month.
+///
+/// # Panics
+/// If there is none.
+pub fn newest_log(name: &str) -> PathBuf {
+    let months = repository().join("log").read_dir().expect("the log");
+    let files = months.map(|month| month.expect("readable").path().join(name));
+    files
+        .filter(|file| file.is_file())
+        .max()
+        .expect("a file of this name in the log")
 }
 
 /// Returns a file or folder of the shared data beside the repository (`../shared`), or `None` after

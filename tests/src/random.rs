@@ -4,7 +4,7 @@
 pub struct Random(u64);
 
 impl Random {
-    /// Creates a generator: the same seed gives the same numbers.
+    /// Creates a generator: the same seed yields the same numbers.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self(seed)

@@ -167,7 +167,7 @@ impl OnBoard {
             .link
             .receive(&mut chunk, HANG)
             .expect("the board is there");
-        assert!(n > 0, "the board said nothing for {HANG:?}");
+        assert!(n > 0, "the board sent nothing for {HANG:?}");
         chunk[..n].to_vec()
     }
 

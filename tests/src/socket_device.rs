@@ -77,13 +77,13 @@ impl SocketDevice {
     /// Waits until a host has sent an open to the deaf device.
     pub fn wait_for_ignored_hello(&self) {
         let hellos = &self.counts.ignored_hellos;
-        wait_until("a hello", || hellos.load(Ordering::Relaxed) > 0);
+        wait_until("an open message", || hellos.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host has sent a close to the deaf device.
     pub fn wait_for_ignored_bye(&self) {
         let byes = &self.counts.ignored_byes;
-        wait_until("a goodbye", || byes.load(Ordering::Relaxed) > 0);
+        wait_until("a close message", || byes.load(Ordering::Relaxed) > 0);
     }
 
     /// Waits until a host or its guardian has sent the deaf device a message that ends a session.

@@ -32,7 +32,10 @@ pub fn wait_for<T>(what: &str, mut poll: impl FnMut() -> Option<T>) -> T {
         if let Some(found) = poll() {
             return found;
         }
-        assert!(began.elapsed() < HANG, "in vain for {HANG:?}: {what}");
+        assert!(
+            began.elapsed() < HANG,
+            "waited {HANG:?} without success: {what}"
+        );
         sleep(POLL_INTERVAL);
     }
 }
@@ -62,7 +65,7 @@ pub fn end_of(mut child: Child) -> Output {
     child.wait_with_output().expect("its output")
 }
 
-/// Returns the next value of a channel, or `None` when all its senders are gone.
+/// Returns the next value of a channel, or `None` when all its senders are dropped.
 ///
 /// # Panics
 /// After [`HANG`].
@@ -70,11 +73,11 @@ pub fn next<T>(from: &Receiver<T>) -> Option<T> {
     match from.recv_timeout(HANG) {
         Ok(value) => Some(value),
         Err(RecvTimeoutError::Disconnected) => None,
-        Err(RecvTimeoutError::Timeout) => panic!("nothing came for {HANG:?}"),
+        Err(RecvTimeoutError::Timeout) => panic!("received nothing for {HANG:?}"),
     }
 }
 
-/// Lets real time pass for a product in another thread or process. The test must also hold if the
+/// Lets real time pass for a product in another thread or process. The test must also pass if the
 /// product did nothing in this time.
 pub fn pass(time: Duration) {
     sleep(time);

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use hapterra_tests::figures::{check, renewed};
-use hapterra_tests::repository;
+use hapterra_tests::{repository, traceability};
 
 /// Longest line of a page, characters.
 const MAX_LINE: usize = 120;
@@ -54,6 +54,19 @@ fn figures_on_the_pages_are_those_of_the_tables() {
     assert!(stale.is_empty(), "{}\n{command}", stale.join("\n"));
 }
 
+#[test]
+fn page_of_the_evidence_lists_the_marked_tests() {
+    let path = repository().join("docs/contributing/traceability.md");
+    let marked = traceability::evidence(repository()).expect("marked tests");
+    let page = traceability::page(&marked);
+    if std::env::var("HAPTERRA_DOCS").is_ok_and(|mode| mode == "write") {
+        std::fs::write(&path, &page).expect("the page can be written");
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    let command = "to renew the page: cargo xtask docs --write";
+    assert!(written == page, "{} is old\n{command}", path.display());
+}
+
 /// Returns the text without its blocks of code.
 fn prose(text: &str) -> String {
     text.split("\n```").step_by(2).collect()
@@ -68,16 +81,18 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
+/// Returns the links of this prose to files and headings, without those to the web.
+fn local_links(prose: &str) -> impl Iterator<Item = &str> {
+    let links = prose.split("](").skip(1);
+    let links = links.filter_map(|rest| rest.split(')').next());
+    links.filter(|link| !link.contains("://") && !link.starts_with("mailto:"))
+}
+
 /// Returns a message for each link of a page to a file or a heading that does not exist.
 fn dead_links(page: &Path, text: &str) -> Vec<String> {
     let text = prose(text);
-    let links = text
-        .split("](")
-        .skip(1)
-        .filter_map(|rest| rest.split(')').next());
-    let is_local = |link: &&str| !link.contains("://") && !link.starts_with("mailto:");
     let mut dead = Vec::new();
-    for link in links.filter(is_local) {
+    for link in local_links(&text) {
         let (file, expected) = link.split_once('#').unwrap_or((link, ""));
         let folder = page.parent().expect("a folder");
         let target = if file.is_empty() {
@@ -100,14 +115,62 @@ fn dead_links(page: &Path, text: &str) -> Vec<String> {
     dead
 }
 
+/// Returns a message for each link of a page that leaves the folder of its book: mdBook copies only
+/// this folder.
+fn leaving_links(book: &Path, page: &Path, text: &str) -> Vec<String> {
+    let book = book.canonicalize().expect("a folder");
+    let text = prose(text);
+    let folder = page.parent().expect("a folder");
+    let leaves = |link: &&str| {
+        let file = link.split('#').next().unwrap_or_default();
+        let target = folder.join(file).canonicalize();
+        target.is_ok_and(|target| !target.starts_with(&book))
+    };
+    local_links(&text)
+        .filter(leaves)
+        .map(|link| format!("{}: {link}: outside the book", page.display()))
+        .collect()
+}
+
 #[test]
 fn links_of_the_pages_lead_somewhere() {
-    let pages = pages_and(&["README.md"]);
+    let pages = pages_and(&[
+        "README.md",
+        "core/README.md",
+        "page/README.md",
+        "python/README.md",
+        "touch/README.md",
+    ]);
     let dead: Vec<_> = pages
         .iter()
+        .chain(&pages_in(&repository().join("log")))
         .flat_map(|(page, text)| dead_links(page, text))
         .collect();
     assert!(dead.is_empty(), "{}", dead.join("\n"));
+}
+
+#[test]
+fn links_of_the_book_stay_in_it() {
+    let book = repository().join("docs");
+    let leaving: Vec<_> = pages_in(&book)
+        .iter()
+        .flat_map(|(page, text)| leaving_links(&book, page, text))
+        .collect();
+    assert!(leaving.is_empty(), "{}", leaving.join("\n"));
+}
+
+#[test]
+fn links_that_leave_a_book_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let book = folder.path().join("book");
+    std::fs::create_dir(&book).expect("a folder");
+    std::fs::write(folder.path().join("code.md"), "").expect("written");
+    let page = book.join("page.md");
+    let text = "[a](page.md) [b](#b) [c](../code.md#c) [d](../book/page.md) [e](https://e)\n";
+    std::fs::write(&page, text).expect("written");
+    let leaving = leaving_links(&book, &page, text);
+    assert_eq!(leaving.len(), 1, "{leaving:?}");
+    assert!(leaving[0].contains("../code.md#c: outside the book"));
 }
 
 #[test]
@@ -229,7 +292,7 @@ fn cells_of_a_table_are_compared() {
     assert_eq!(reported(&table(right)), (3, vec![]));
     let (count, wrong) = reported(&table("| sliding | 1,217 | 0.05 |\n| free | 1144 | 2e-6 |"));
     assert_eq!((count, wrong.len()), (4, 1), "{wrong:?}");
-    assert!(wrong[0].contains("the page says 1,217"), "{wrong:?}");
+    assert!(wrong[0].contains("1,217 on the page"), "{wrong:?}");
     let (_, wrong) = reported(&table("| sliding | 1,218 | 0.05 |"));
     assert!(wrong[0].contains("2 rows are named, 1 shown"), "{wrong:?}");
     let (_, wrong) = reported(&table("| sliding | 1,218 |\n| free | 1144 | |"));
@@ -257,10 +320,10 @@ fn figure_that_differs_from_the_table_is_detected() {
         (
             "sliding, median",
             "1217",
-            "the page says 1217, the table 1218",
+            "1217 on the page, 1218 in the table",
         ),
-        ("sliding, share", "0.04", "the page says 0.04"),
-        ("chain, free, share", "3e-6", "the page says 3e-6"),
+        ("sliding, share", "0.04", "0.04 on the page"),
+        ("chain, free, share", "3e-6", "3e-6 on the page"),
         ("sliding, median", "many", "no figure behind the comment"),
         ("gliding, median", "1218", "no such row"),
         ("sliding, mean", "1218", "no such column"),

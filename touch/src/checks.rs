@@ -22,7 +22,7 @@ pub enum TerrainError {
         rows: u32,
     },
     /// The number of samples does not match the size.
-    #[error("{given} samples for {columns} columns and {rows} rows: give columns times rows")]
+    #[error("{given} samples for {columns} columns and {rows} rows: pass columns times rows")]
     Count {
         /// Samples in the array.
         given: usize,
@@ -40,7 +40,7 @@ pub enum TerrainError {
         rows: u32,
     },
     /// A row has another length than the first.
-    #[error("row {row} has {given} samples and row 0 has {first}: make all rows as long")]
+    #[error("row {row} has {given} samples and row 0 has {first}: make all rows equally long")]
     Ragged {
         /// The row's index, in the order of the array.
         row: usize,
@@ -57,7 +57,7 @@ pub enum TerrainError {
     Tip(#[from] TipError),
     /// Under this tip the terrain would have more cells than positions can address.
     #[error(
-        "a tip of {tip_mm} mm cuts each cell into {parts} along a side, and {columns} × {rows} samples are too many for that: give a larger tip, or fewer samples"
+        "a tip of {tip_mm} mm cuts each cell into {parts} along a side, and {columns} × {rows} samples are too many for that: use a larger tip, or fewer samples"
     )]
     TipCells {
         /// The radius, mm.

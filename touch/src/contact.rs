@@ -93,7 +93,7 @@ pub enum ContactError {
         count: usize,
     },
     /// The loop does not support this tick rate.
-    #[error("{0} ticks a second: give 1,000 to 10,000, in whole thousands")]
+    #[error("{0} ticks a second: use 1,000 to 10,000, in whole thousands")]
     Rate(u32),
     /// The loop refuses the scene.
     #[error("the loop refuses the surface on this terrain: report it as a fault of hapterra")]
@@ -104,7 +104,7 @@ pub enum ContactError {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StepError {
     /// The position is not a number, or too far away.
-    #[error("the HIP is at {hip_mm:?} mm: give numbers within {MAX_CELL} cells of {cell_mm} mm")]
+    #[error("the HIP is at {hip_mm:?} mm: use numbers within {MAX_CELL} cells of {cell_mm} mm")]
     Place {
         /// The position, mm.
         hip_mm: [f64; 3],
@@ -125,7 +125,7 @@ pub enum StepError {
         north_mm: f64,
     },
     /// The position is too far from the last one.
-    #[error("the path to {hip_mm:?} mm takes too many ticks: go there in smaller steps")]
+    #[error("the path to {hip_mm:?} mm requires too many ticks: use smaller steps")]
     Far {
         /// The position, mm.
         hip_mm: [f64; 3],

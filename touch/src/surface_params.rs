@@ -20,7 +20,7 @@ use hapterra_core::force::{Damping, Material, MaterialTable, SurfaceParams, Text
 ///
 /// let params = SurfaceParams { friction: Friction::coulomb(-1.0), ..params };
 /// let error = Surface::new(params).unwrap_err();
-/// assert_eq!(error.to_string(), "dynamic friction is -1: give 0 to 10");
+/// assert_eq!(error.to_string(), "dynamic friction is -1: use 0 to 10");
 /// # Ok::<(), hapterra_touch::SurfaceError>(())
 /// ```
 #[doc(alias = "stiffness")]
@@ -35,7 +35,7 @@ pub struct Surface {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// A number is out of its bounds.
-    #[error("{what} is {value}: give {min} to {max}")]
+    #[error("{what} is {value}: use {min} to {max}")]
     Bounds {
         /// Name of the number.
         what: &'static str,
@@ -57,10 +57,10 @@ pub enum SurfaceError {
         dynamic_mu: f32,
     },
     /// There are too many materials.
-    #[error("{0} materials besides the surface itself: give at most {max}", max = MaterialTable::MAX - 1)]
+    #[error("{0} materials besides the surface itself: use at most {max}", max = MaterialTable::MAX - 1)]
     Materials(usize),
     /// There are materials, which scale the stiffness, but the stiffness is zero.
-    #[error("a surface with materials has a stiffness of 0 N/mm: give more")]
+    #[error("a surface with materials has a stiffness of 0 N/mm: use more")]
     NoStiffness,
     /// The texture is too fine or too coarse for the terrain's cells.
     #[error(

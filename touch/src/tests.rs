@@ -210,7 +210,7 @@ fn out_of_range_parameters_are_reported() {
     let bad = [
         (
             params(|it| it.stiffness_n_per_mm = -1.0),
-            "stiffness, N/mm, is -1: give 0 to",
+            "stiffness, N/mm, is -1: use 0 to",
         ),
         (
             params(|it| it.max_force_n = f32::NAN),
@@ -218,7 +218,7 @@ fn out_of_range_parameters_are_reported() {
         ),
         (
             params(|it| it.friction.dynamic_mu = 11.0),
-            "dynamic friction is 11: give 0 to 10",
+            "dynamic friction is 11: use 0 to 10",
         ),
         (
             params(|it| it.friction.static_mu = -0.5),
@@ -230,15 +230,15 @@ fn out_of_range_parameters_are_reported() {
         ),
         (
             params(|it| it.friction.viscous_s = 2.0),
-            "viscous friction, s, is 2: give 0 to 1",
+            "viscous friction, s, is 2: use 0 to 1",
         ),
         (
             params(|it| it.damping.ns_per_m = 21.0),
-            "damping, N·s/m, is 21: give 0 to 20",
+            "damping, N·s/m, is 21: use 0 to 20",
         ),
         (
             params(|it| it.texture.pattern = Pattern::Grain),
-            "texture wavelength, mm, is 0: give 0.25 to 100",
+            "texture wavelength, mm, is 0: use 0.25 to 100",
         ),
     ];
     for (params, text) in bad {
@@ -273,7 +273,7 @@ fn invalid_terrains_are_errors() {
     let error = Terrain::from_rows(1.0, RowOrder::NorthFirst, &ragged).expect_err("is refused");
     assert_eq!(
         error.to_string(),
-        "row 1 has 2 samples and row 0 has 3: make all rows as long"
+        "row 1 has 2 samples and row 0 has 3: make all rows equally long"
     );
     let metres = Terrain::from_fn(3, 3, 0.1, |x, _| x as i16 * 2000).expect("a terrain");
     let metres = metres.with_height_scale(0.01).expect("a scale");

@@ -91,7 +91,7 @@ impl TickLoop {
         })
     }
 
-    /// Renders a point with all terrain that it needs; `None` if that takes too many ticks.
+    /// Renders a point with all terrain that it needs; `None` if that requires too many ticks.
     pub(crate) fn step(
         &mut self,
         hip: GridPoint,

@@ -168,8 +168,8 @@ impl Terrain {
         Ok(TILE_SAMPLES)
     }
 
-    /// Reads the samples on which a ball's nodes depend, for `side` nodes each way from a rendered
-    /// sample, in haptic cells: NaN for no-data and outside the field.
+    /// Reads the samples on which a ball's nodes depend, for `side` nodes in each direction from a
+    /// rendered sample, in haptic cells: NaN for no-data and outside the field.
     fn samples_around(
         &self,
         ball: &Ball,

@@ -131,7 +131,7 @@ async function follow(viewer, memory, feed) {
     await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
   state.isOver = true;
-  showMessage(state.isLost ? "hapterra is gone: it was killed, or it crashed. The page shows its last data." : "");
+  showMessage(state.isLost ? "hapterra ended unexpectedly: it was killed, or it crashed. The page shows its last data." : "");
 }
 
 async function main() {

@@ -114,7 +114,9 @@ fn check_greeting(from: &mut impl Read) -> Result<()> {
             hello.program,
             hello.version
         ),
-        Some(_) => bail!("the stream does not begin with a greeting: is this hapterra's?"),
+        Some(_) => {
+            bail!("the stream does not begin with a `Hello` message: hapterra did not write it")
+        }
         None => bail!(
             "there is nothing on standard input: hapterra starts this program itself, with `hapterra run|demo|replay --view` or `hapterra view RECORDING`"
         ),

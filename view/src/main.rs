@@ -74,7 +74,7 @@ fn show(options: &Options) -> Result<()> {
     let stats = history.stats();
     if stats.dropped > 0 {
         print_line(&format!(
-            "view           pages were too slow {} times, and came again",
+            "view           pages were too slow {} times, and reconnected",
             stats.dropped
         ));
     }

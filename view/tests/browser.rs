@@ -134,7 +134,7 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, address) = Session::start("--linger 0");
+    let (mut session, address) = Session::start("--linger 0s");
     let page = browser.open(&address);
     let mut feed_samples = || session.feed_samples(200);
     let (terrain, plots) = shown(&mut browser, &page, &mut feed_samples, is_whole);
@@ -155,7 +155,7 @@ fn page_shows_live_scene_and_plots_without_foreign_requests() {
     while browser.number(&page, "performance.timeOrigin") == began {
         feed_samples();
         std::thread::sleep(Duration::from_millis(200));
-        assert!(Instant::now() < until, "it goes on with what it had");
+        assert!(Instant::now() < until, "the page does not reload");
     }
     shown(&mut browser, &page, &mut feed_samples, is_whole);
     browser.reload(&page);
@@ -182,7 +182,7 @@ fn oversized_page_reloads_and_continues() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let (mut session, address) = Session::start("--linger 0 --page-mb 64");
+    let (mut session, address) = Session::start("--linger 0s --page 64MB");
     let page = browser.open(&address);
     let mut until = |condition: &dyn Fn(f64, f64) -> bool| {
         let until = Instant::now() + HANG;
@@ -230,7 +230,7 @@ fn page_shows_live_contact_on_the_emulated_board() {
         .arg(format!("--device=emulated:{}", image.display()))
         .arg("--out")
         .arg(&folder);
-    let mut demo = Running::start_with_viewer(&mut demo, &format!("--rrd {}", live.display()));
+    let mut demo = Running::start_with_viewer(&mut demo, &format!("-o {}", live.display()));
     let address = demo.address();
     let page = browser.open(&address);
     let mut is_touched = || {
@@ -272,7 +272,7 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
     let Some(mut browser) = browser_in(&folder) else {
         return;
     };
-    let mut viewer = Viewer::start("--linger 0");
+    let mut viewer = Viewer::start("--linger 0s");
     let begin = [greeting(), scene(true), layer()];
     for message in begin.iter().chain(&tiles_around([2, 2])) {
         assert!(viewer.send(message));
@@ -303,7 +303,10 @@ fn pan_and_zoom_under_a_resting_hand_move_the_picture_and_back() {
                 return picture;
             }
             before = picture;
-            assert!(Instant::now() < until, "it does not come to that");
+            assert!(
+                Instant::now() < until,
+                "the picture does not become correct"
+            );
         }
     };
     let first = settled(&|_, _| true);
@@ -408,7 +411,7 @@ fn killed(who: Killed, says: &str) {
         .as_str()
         .is_some_and(|text| text.contains(says))
     {
-        assert!(Instant::now() < until, "the page does not say so");
+        assert!(Instant::now() < until, "the page does not show it");
         std::thread::sleep(Duration::from_millis(200));
     }
     drop(browser);
@@ -423,7 +426,7 @@ fn killed(who: Killed, says: &str) {
             "{reported}"
         );
         assert!(
-            reported.contains("were not shown: the viewer was slow, or gone"),
+            reported.contains("were not shown: the viewer was slow, or had ended"),
             "{reported}"
         );
     }
@@ -438,7 +441,7 @@ fn killed(who: Killed, says: &str) {
 
 #[test]
 fn page_reports_hapterra_killed_and_viewer_exits() {
-    killed(Killed::Hapterra, "hapterra is gone");
+    killed(Killed::Hapterra, "hapterra ended unexpectedly");
 }
 
 #[test]

@@ -110,7 +110,7 @@ fn stalled_and_disconnecting_pages_do_not_block_the_viewer() {
     assert!(viewer.send(&Message::End));
     let mut rest = Vec::new();
     last.read_to_end(&mut rest).expect("the stream ends");
-    assert!(rest.ends_with(&[0; 4]), "its end is said");
+    assert!(rest.ends_with(&[0; 4]), "its end is reported");
     assert!(rest.len() > 100_000, "{}", rest.len());
 }
 
@@ -155,7 +155,7 @@ fn feed_end_distinguishes_session_end_from_lost_hapterra() {
 
 #[test]
 fn viewer_exits_after_the_last_page_disconnects() {
-    let (mut viewer, port) = live("--linger 0.2");
+    let (mut viewer, port) = live("--linger 0.2s");
     let page = reading(port, 1000);
     viewer.close_stream();
     std::thread::sleep(std::time::Duration::from_millis(100));
@@ -174,7 +174,7 @@ fn viewer_exits_if_hapterra_dies_before_any_page_connects() {
 #[cfg(target_os = "linux")]
 #[test]
 fn full_disk_under_rrd_file_is_reported_and_page_still_works() {
-    let (mut viewer, port) = live("--rrd /dev/full --linger 0");
+    let (mut viewer, port) = live("-o /dev/full --linger 0s");
     let mut held = Vec::new();
     for round in 1..100u64 {
         for message in batch(100 * round, 100 * (round + 1), &mut held) {

@@ -62,7 +62,7 @@ impl Reported {
 
 #[test]
 fn gathered_feed_has_the_same_rows_in_far_fewer_entries() {
-    let mut viewer = Viewer::start("--linger 5");
+    let mut viewer = Viewer::start("--linger 5s");
     for message in [greeting(), scene(true), layer()] {
         assert!(viewer.send(&message));
     }

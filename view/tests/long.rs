@@ -81,7 +81,7 @@ fn each_bad_figure_is_reported() {
                 tiles          8 fetched (35044 bytes), 2 of them again\n\
                 telemetry      9 samples, 0 lost on the link, 0 dropped by the device\n";
     assert!(complaints(good).is_empty());
-    let unanswered = format!("{good}link           1 requests and questions without an answer\n");
+    let unanswered = format!("{good}link           1 requests and queries without an answer\n");
     let bad = [
         good.replace("0 late", "10 late"),
         good.replace("0 lost", "40 lost"),
@@ -94,7 +94,7 @@ fn each_bad_figure_is_reported() {
 }
 
 #[test]
-#[ignore = "takes ten minutes"]
+#[ignore = "runs for ten minutes"]
 fn history_of_ten_minutes_is_bounded() {
     let folder = folder("long");
     let Some(mut demo) = touching(&folder) else {
@@ -113,7 +113,7 @@ fn history_of_ten_minutes_is_bounded() {
     let page = browser.open(&address);
     let mut second = None;
     println!(
-        "minute | hapterra, MB | viewer, MB | page, MB, for s | told to the page, MB | second shown, of the session's"
+        "minute | hapterra, MB | viewer, MB | page, MB, for s | sent to the page, MB | second shown, of the session's"
     );
     let began = Instant::now();
     let mut maxima = [0; 3];

@@ -87,7 +87,7 @@ impl Shown {
 }
 
 #[test]
-#[ignore = "takes a minute, and writes into docs/"]
+#[ignore = "runs for a minute, and writes into docs/"]
 fn pictures_at_the_start_while_sliding_and_zoomed() {
     let into = std::env::var_os("HAPTERRA_PICTURES").expect("HAPTERRA_PICTURES names a folder");
     let into = Path::new(&into);

@@ -20,7 +20,7 @@ fn synth(file: &Path, size: &str) {
 
 /// Returns the option that also writes the display to a file.
 fn rrd(into: &Path) -> String {
-    format!("--rrd {}", into.display())
+    format!("-o {}", into.display())
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn live_and_recorded_views_have_the_values_of_the_csv() {
     view.arg("view").arg(&recording).arg("--ignore-settings");
     Running::run_to_end(view.arg(&terrain), &rrd(&repeated));
     check(&csv, &entities(&repeated));
-    std::fs::remove_dir_all(folder).expect("it goes");
+    std::fs::remove_dir_all(folder).expect("it is removed");
 }
 
 #[test]
@@ -109,7 +109,7 @@ fn views_of_a_terrain_lie_on_it_live_recorded_and_replayed() {
     view.arg("view").arg(&rendered).arg(&terrain);
     run(&mut view, &at("parquet.rrd"));
     check_views(&csv, &entities(&at("parquet.rrd")), true);
-    std::fs::remove_dir_all(folder).expect("it goes");
+    std::fs::remove_dir_all(folder).expect("it is removed");
 }
 
 #[test]
@@ -136,5 +136,5 @@ fn map_shows_the_extent_fitted_to_the_workspace() {
         .zip(expected)
         .map(|(side, expected)| (side - expected).abs());
     assert!(off.fold(0.0, f64::max) < 1.0, "{sides:?}");
-    std::fs::remove_dir_all(folder).expect("it goes");
+    std::fs::remove_dir_all(folder).expect("it is removed");
 }

@@ -104,8 +104,8 @@ fn demo_page_receives_the_coarse_layer_first() {
     let elapsed = session.elapsed();
     let after = check(&reported(port), &[]);
     println!(
-        "terrain read after {read:?}; then the page's address after {elapsed:?}, and the coarse whole {after:?} after it was asked for"
+        "terrain read after {read:?}; then the page's address after {elapsed:?}, and the coarse whole {after:?} after its request"
     );
     assert!(demo.end());
-    std::fs::remove_dir_all(folder).expect("it goes");
+    std::fs::remove_dir_all(folder).expect("it is removed");
 }

@@ -73,15 +73,15 @@ const EMULATED_CALLS: &[Exception] = &[
         caller: &["Serial", "on_received"],
         callee: "panic_already_borrowed",
         targets: &[],
-        because: "embassy's ring of bytes is borrowed in critical sections only, which hold this \
-                  interrupt back",
+        because: "embassy's ring of bytes is borrowed in critical sections only, which mask this \
+                  interrupt",
     },
     Exception {
         caller: &["Serial", "on_received"],
         callee: "core::panicking::panic",
         targets: &[],
-        because: "embassy's ring of bytes keeps its places below its length, and was asked whether \
-                  there is room",
+        because: "embassy's ring of bytes keeps its indices below its length, and was checked for \
+                  free space",
     },
     Exception {
         caller: &["wire::frame::Framing"],
@@ -98,7 +98,7 @@ const TIMER_QUEUE: Exception = Exception {
     callee: "panic_already_borrowed",
     targets: &[],
     because: "the queue of timers is borrowed in critical sections only, this interrupt's among \
-              them; they hold this interrupt back, so it finds no borrow",
+              them; they mask this interrupt, so it finds no borrow",
 };
 
 /// Calls that wake a task.
@@ -132,7 +132,7 @@ const fn waker(caller: &'static [&'static str]) -> Exception {
         caller,
         callee: "",
         targets: &["embassy_executor::raw::waker::wake"],
-        because: "a task's waker: all tasks are embassy's, so there is one table of what wakers do",
+        because: "a task's waker: all tasks are embassy's, so there is one table of waker functions",
     }
 }
 
@@ -152,7 +152,7 @@ const fn queue(caller: &'static [&'static str]) -> Exception {
         caller,
         callee: "panic_const_rem_by_zero",
         targets: &[],
-        because: "heapless' queues wrap by `% length`, and know their length, never 0, only at run time",
+        because: "heapless' queues wrap by `% length`, a length that is never 0 and is set only at run time",
     }
 }
 

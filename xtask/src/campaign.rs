@@ -1,19 +1,20 @@
 //! `cargo xtask campaign`: the closed-loop campaign, or the campaign of link faults, at full speed.
 
 use std::ffi::OsString;
+use std::fs;
 use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::run::{cargo, output, root, run, timed};
 
-/// Runs the campaign with the user's arguments. Without a segment it writes the report to
-/// `log/campaign.md`, or to `log/link-campaign.md` with `--link`.
+/// Runs the campaign with the user's arguments. Without a segment it writes the report
+/// `campaign.md`, or `link-campaign.md` with `--link`, into the folder of the month in `log/`.
 pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     let words: Vec<_> = words.collect();
     let page = match words.iter().any(|word| word == "--link") {
-        true => "log/link-campaign.md",
-        false => "log/campaign.md",
+        true => "link-campaign.md",
+        false => "campaign.md",
     };
     let whole = !words.iter().any(|word| word == "--segment");
     timed("the campaign", || {
@@ -23,7 +24,9 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
             .args(["--bin", "hapterra-campaign", "--"])
             .args(&words);
         if whole {
-            command.arg("--report").arg(root().join(page));
+            let folder = root().join("log").join(month());
+            fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+            command.arg("--report").arg(folder.join(page));
             if let Some(commit) = commit() {
                 command.arg("--commit").arg(commit);
             }
@@ -32,9 +35,19 @@ pub(crate) fn campaign(words: impl Iterator<Item = OsString>) -> Result<()> {
     })
 }
 
+/// Returns what git prints, if it can.
+fn git(words: &[&str]) -> Option<String> {
+    output(Command::new("git").args(words).current_dir(root()))
+}
+
+/// Returns the month of the last commit, such as `2026-11`, or `undated` without git.
+fn month() -> String {
+    let month = git(&["log", "-1", "--format=%cd", "--date=format:%Y-%m"]);
+    month.map_or_else(|| "undated".to_owned(), |month| month.trim().to_owned())
+}
+
 /// Returns the commit of the source, if git has it, for the report.
 fn commit() -> Option<String> {
-    let git = |words: &[&str]| output(Command::new("git").args(words).current_dir(root()));
     let commit = git(&["rev-parse", "--short", "HEAD"])?;
     // The report itself may be changed and not committed yet.
     let tracked = [

@@ -60,7 +60,7 @@ pub(crate) fn demo(request: &Request) -> Result<i32> {
 fn emulation_or_report() -> Option<Emulation> {
     emulation()
         .inspect_err(|why| {
-            report(format!("the emulated board cannot be had: {why:#}"));
+            report(format!("the emulated board is not available: {why:#}"));
             report("so the same application runs compiled for this machine (--device native)");
         })
         .ok()
@@ -110,7 +110,7 @@ impl Request {
             let device = if is_emulated { "emulated" } else { "native" };
             words.extend(["--device", device].map(OsString::from));
         }
-        if self.value("--out").is_none() {
+        if self.value("-o").or(self.value("--out")).is_none() {
             words.extend(["--out".into(), root().join("demo").into()]);
         }
         if self.view {
@@ -161,8 +161,11 @@ mod tests {
 
     #[test]
     fn device_defaults_to_native_without_emulation() {
-        let line = line(None, &["--out", "x"], false);
-        assert_eq!(line, "demo --exaggeration auto --device native --out x");
+        for out in ["-o", "--out"] {
+            let line = line(None, &[out, "x"], false);
+            let expected = format!("demo --exaggeration auto --device native {out} x");
+            assert_eq!(line, expected);
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub(crate) fn fuzz(target: &str, minutes: &str) -> Result<()> {
     nightly::ready(&["--version"], "")?;
     has_cargo_fuzz()?;
     if on_path("c++").is_none() {
-        bail!("libFuzzer wants a C++ compiler; on Debian: apt-get install g++");
+        bail!("libFuzzer requires a C++ compiler; on Debian: apt-get install g++");
     }
     timed(&format!("fuzzing {target} for {minutes} minutes"), || {
         run(

@@ -37,28 +37,28 @@ const HELP: &str = "\
 cargo xtask COMMAND
 
   demo [FILE] [-- ARGS]  touch a terrain file on the emulated board; without FILE,
-                         a terrain made on the spot; ARGS go to `hapterra demo`
-  demo --view [FILE]     the same, live in a browser; builds the viewer, too
-  demo --touch [FILE] [--out FOLDER]
-                         touch it with the mouse on a page in a browser, no arm needed; --out:
+                         its own synthetic terrain; ARGS go to `hapterra demo`
+  demo --view [FILE]     the same, live in a browser; also builds the viewer
+  demo --touch [FILE] [-o FOLDER]
+                         touch it with the mouse on a page in a browser, no arm needed; -o:
                          only write the page's folder, for any web server
-  page --test            the page's tests, in a browser where there is one
+  page --test            run the page's tests, in a browser if one is installed
   view [--test|--pictures]
-                         build the viewer; --test: run its tests, in a browser where there is
-                         one; --pictures: take those in docs/
-  python [--test]        build the Python package's wheel and print where it is; --test: install
-                         it in an environment of its own and run its tests; without Python
-                         3.9 it says so
+                         build the viewer; --test: run its tests, in a browser if one is
+                         installed; --pictures: take the pictures in docs/
+  python [--test]        build the Python package's wheel and print its path; --test: install
+                         it in its own environment and run its tests; reports if Python 3.9
+                         is missing
   test [--quick] [-- ARGS]
                          all tests, with images, budgets, dependencies, the page and the
-                         Python package; what failed is listed at the end; --quick: the
+                         Python package; failures are listed at the end; --quick: the
                          emulated board only, no dependencies, page and Python; ARGS go to
                          `cargo test` and select programs, as `--test link`
   lint                   formatting, clippy and documentation, warnings as errors
   census [--write]       words, options, public items, circles of files and lines of code, beside
                          the stored table and the bounds; --write: store these
   docs [--write]         the reference, figures and links of the book, and the book
-                         itself where mdBook is installed; --write: write the reference anew
+                         itself if mdBook is installed; --write: write the reference anew
   setup                  only find or install what the commands need
   size [BOARD]           build the images and compare them with their flash and RAM budgets
   panics [BOARD]         build the images and prove that no interrupt can panic
@@ -70,17 +70,17 @@ cargo xtask COMMAND
   soak --seed N --scene K [--rough]  one of them again
   campaign [--seconds N] [--seed S] [--segment K [--effects]]
                          the closed loop with faults injected at random, 10,000 s of arm time
-                         by default; writes log/campaign.md
+                         by default; writes log/MONTH/campaign.md
   campaign --link [--seconds N] [--seed S] [--segment K]
                          faults of the link, killed and hostile hosts and devices, an hour of
-                         device time by default; writes log/link-campaign.md
+                         device time by default; writes log/MONTH/link-campaign.md
   fuzz TARGET MINUTES    run libFuzzer on `terrain` (files of every format), `text` (recordings,
                          calibrations, tables, commands), `tick`, `tile` or `wire`; installs
-                         cargo-fuzz and a nightly compiler where they are missing
-  miri                   core's tests under Miri, where it can run
+                         cargo-fuzz and a nightly compiler if they are missing
+  miri                   core's tests under Miri, if it can run
   deny                   licences, bans, sources and advisories of the dependencies of all
-                         workspaces: the viewer's, Python's and the fuzz targets', too
-  image BOARD            build an image and print where its ELF is
+                         workspaces, also those of the viewer, Python and the fuzz targets
+  image BOARD            build an image and print the path of its ELF
   flash BOARD            run an image on a real board with probe-rs
 
   HAPTERRA_TOOLCHAIN=rustup|distribution  builds the images only with this one
@@ -246,7 +246,7 @@ fn test_words(words: &mut lexopt::Parser) -> Result<test::Request> {
     }
 }
 
-/// Parses `[--view|--touch [--out FOLDER]] [FILE] [-- ARGS]`: arguments after `--` are passed on
+/// Parses `[--view|--touch [-o FOLDER]] [FILE] [-- ARGS]`: arguments after `--` are passed on
 /// unchanged.
 fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
     let mut request = demo::Request::default();
@@ -263,7 +263,9 @@ fn demo_words(words: &mut lexopt::Parser) -> Result<demo::Request> {
         match words.next()? {
             Some(Long("view")) => request.view = true,
             Some(Long("touch")) => request.touch = true,
-            Some(Long("out")) if request.touch => request.out = Some(words.value()?.into()),
+            Some(Short('o') | Long("out")) if request.touch => {
+                request.out = Some(words.value()?.into());
+            }
             Some(Value(file)) if request.file.is_none() => request.file = Some(file),
             Some(other) => {
                 let what = other.unexpected();
@@ -299,8 +301,10 @@ mod tests {
         assert_eq!(request.file, Some("a.tif".into()));
         assert_eq!(request.extra, ["--rounds", "3", "--"]);
         assert_eq!(demo(&["--", "b"]).unwrap().file, None);
-        let touched = demo(&["--touch", "--out", "f", "a.tif"]).unwrap();
-        assert_eq!((touched.touch, touched.out), (true, Some("f".into())));
+        for out in ["-o", "--out"] {
+            let touched = demo(&["--touch", out, "f", "a.tif"]).unwrap();
+            assert_eq!((touched.touch, touched.out), (true, Some("f".into())));
+        }
         let viewed = demo(&["--view", "a.tif"]).unwrap();
         assert_eq!((viewed.view, viewed.file), (true, Some("a.tif".into())));
         assert_eq!(demo(&[]).unwrap(), demo::Request::default());

@@ -35,7 +35,7 @@ pub(crate) fn check<'a>(images: impl Iterator<Item = (&'a Board, &'a Path)>) -> 
             );
             if bytes > budget {
                 over.push(format!(
-                    "{} takes {bytes} bytes of {name}, its budget is {budget}",
+                    "{} uses {bytes} bytes of {name}, its budget is {budget}",
                     board.name
                 ));
             }

@@ -10,9 +10,9 @@ use crate::run::{cargo, command_line, run, target_dir, timed};
 /// passes `words` to it.
 pub(crate) fn soak(words: Vec<OsString>) -> Result<()> {
     if words.is_empty() {
-        bail!("say for how long: cargo xtask soak MINUTES [--seed N], or --seed N --scene K");
+        bail!("state the duration: cargo xtask soak MINUTES [--seed N], or --seed N --scene K");
     }
-    timed("building the soak", || {
+    timed("building the randomised stress test", || {
         let package = ["--package", "hapterra-tests", "--bin", "hapterra-soak"];
         run(cargo().args(["build", "--profile", "soak"]).args(package))
     })?;

@@ -10,7 +10,7 @@ use super::triangle::{Facet, Plane};
 use crate::grid::Grid;
 use crate::variant::{ContactResult, Haptics, Hip};
 
-/// Largest number of facets that hold it at once.
+/// Max number of facets that constrain it at once.
 const PLANES: usize = 3;
 /// Depth of a path's end below a facet from which the facet counts as passed.
 const BELOW: f64 = 1e-12;

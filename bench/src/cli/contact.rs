@@ -23,13 +23,13 @@ pub struct Args {
     pub steepness: f64,
 
     /// Only the change of the force from tick to tick; nothing is timed
-    #[arg(long, conflicts_with_all = ["files", "quick", "picture"])]
+    #[arg(long, conflicts_with_all = ["files", "quick"])]
     pub continuity: bool,
 
     /// Only run time and error of friction, shading, texture, damping and passivity
     ///
-    /// The file of --out then has these figures, which it does not have otherwise.
-    #[arg(long, conflicts_with_all = ["continuity", "picture"])]
+    /// The file of -o then has these figures, which it does not have otherwise.
+    #[arg(long, conflicts_with = "continuity")]
     pub effects: bool,
 }
 
@@ -38,7 +38,11 @@ pub struct Args {
 /// # Errors
 /// A file that cannot be read or written, or a failed measurement.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    let out = args.files.out.as_ref();
+    let has_picture = !(args.continuity || args.effects);
+    let (out, picture) = match has_picture {
+        true => args.files.outputs.table_and_picture()?,
+        false => (args.files.outputs.table_only()?, None),
+    };
     if args.continuity {
         let changes = continuity::measure();
         print!("{}", report::continuity(&changes));
@@ -71,9 +75,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     print!("{}", report::continuity(&changes));
     print!("{}", report::summary(&rows));
     files::write(out, |file| report::write_csv(file, &rows, &changes))?;
-    files::write(args.files.picture.as_ref(), |file| {
-        report::draw(&rows, file)
-    })
+    files::write(picture, |file| report::draw(&rows, file))
 }
 
 /// Opens every file before the first measurement.

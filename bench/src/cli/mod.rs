@@ -16,7 +16,7 @@ use hapterra::cli::{finish, parse};
 #[derive(Debug, Parser)]
 #[command(name = "hapterra-lab", version, propagate_version = true)]
 pub struct Cli {
-    /// Say more: -v for progress, -vv for details, -vvv for everything
+    /// Print more messages: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 

@@ -1,21 +1,23 @@
-//! `hapterra-lab stability`: how stiff a surface may be before it is unstable.
+//! `hapterra-lab stability`: the stiffness above which a surface is unstable.
 
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::ValueHint;
-use hapterra::cli::options::quantity::{DAMPING, FREQUENCY, STIFFNESS, TIME};
 use hapterra::cli::options::surface::{SurfaceChoice, SurfaceOptions, choice};
 use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, OrHint as _, report};
 use hapterra::output::{Output, OutputError};
+use hapterra::quantity::{DAMPING, FREQUENCY, STIFFNESS, TIME};
 use hapterra_core::force::{Controller, Damping};
 use hapterra_core::rate::TickRate;
 
-use crate::stability::map::{Map, Plan};
+use super::files::Outputs;
+use crate::stability::map::Plan;
 use crate::stability::picture;
 
-const OTHER_FILE: &str = "name another file with --out";
-const OTHER_PICTURE: &str = "name another file with --picture";
+const OTHER_FILE: &str = "name another file with -o";
+const OTHER_LIMITS: &str = "name another file with --limits";
 
 /// Arguments of `hapterra-lab stability`.
 #[derive(Debug, clap::Args)]
@@ -25,11 +27,11 @@ pub struct Args {
     pub rate: Vec<TickRate>,
 
     /// Stiffnesses, such as 0.5N/mm
-    #[arg(long, value_name = "N/MM,…", value_delimiter = ',', default_value = "0.1,0.2,0.5,1,1.5,2,2.5,3,4,6,8,12,20", value_parser = parse_stiffness)]
+    #[arg(long, value_name = "N/MM,…", value_delimiter = ',', default_value = "0.1N/mm,0.2N/mm,0.5N/mm,1N/mm,1.5N/mm,2N/mm,2.5N/mm,3N/mm,4N/mm,6N/mm,8N/mm,12N/mm,20N/mm", value_parser = parse_stiffness)]
     pub stiffness: Vec<f64>,
 
     /// Dampings of the surface, such as 2Ns/m
-    #[arg(long, value_name = "NS/M,…", value_delimiter = ',', default_value = "0", value_parser = parse_damping)]
+    #[arg(long, value_name = "NS/M,…", value_delimiter = ',', default_value = "0Ns/m", value_parser = parse_damping)]
     pub damping: Vec<Damping>,
 
     /// Surface whose micro-relief is tried: sand, rock, or a FILE.toml [default: none]
@@ -55,13 +57,13 @@ pub struct Args {
     #[arg(long, value_name = "PART,…", value_delimiter = ',', default_value = "0.1,1", value_parser = parse_part)]
     pub arm_friction: Vec<f64>,
 
-    /// File for every trial, as CSV
-    #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub out: Option<PathBuf>,
-
-    /// File for a picture of it, as PNG
+    /// File for the limits, as CSV
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub picture: Option<PathBuf>,
+    pub limits: Option<PathBuf>,
+
+    /// Files for the trials.
+    #[command(flatten)]
+    pub outputs: Outputs,
 }
 
 /// Setting of the passivity controller.
@@ -73,7 +75,7 @@ pub enum Passivity {
     On,
 }
 
-/// Tries all of it and says the limits.
+/// Runs all trials and prints the limits.
 ///
 /// # Errors
 /// When it is interrupted, or a file cannot be written.
@@ -96,24 +98,19 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     plan.stiffness_n_per_mm.dedup();
     plan.arm_frictions.sort_by(f64::total_cmp);
     plan.arm_frictions.dedup();
-    if args.out.is_some() && args.out == args.picture {
-        return Err(Failure::new("the table and the picture cannot be one file").hint(OTHER_FILE));
+    let (table, drawing) = args.outputs.table_and_picture()?;
+    if args.limits.is_some() && args.limits.as_ref() == table {
+        return Err(Failure::new("trials and limits must be in different files").hint(OTHER_LIMITS));
     }
-    partial_files::report(
-        { args.out.iter() }
-            .chain(&args.picture)
-            .map(PathBuf::as_path),
-    );
+    let files = table.into_iter().chain(drawing).chain(&args.limits);
+    partial_files::report(files.map(PathBuf::as_path));
     // An output that cannot be written is reported before the trials.
-    if let Some(path) = &args.picture {
-        drop(Output::create(path).or_hint(OTHER_PICTURE)?);
+    if let Some(path) = drawing {
+        drop(Output::create(path).or_hint(OTHER_FILE)?);
     }
-    let csv = args
-        .out
-        .as_deref()
-        .map(Output::create)
-        .transpose()
-        .or_hint(OTHER_FILE)?;
+    let create = |path: Option<&PathBuf>| path.map(|path| Output::create(path)).transpose();
+    let csv = create(table).or_hint(OTHER_FILE)?;
+    let limits = create(args.limits.as_ref()).or_hint(OTHER_LIMITS)?;
     let progress = progress::bar(Some(0), "{bar:30} {pos}/{len} trials, {eta} left");
     interrupt::listen();
     let map = plan.map(&|of| {
@@ -126,11 +123,14 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let map = map.ok_or_else(|| Failure::new("interrupted: no limits are printed"))?;
     report::put(&map.summary())?;
     if let Some(csv) = csv {
-        write(csv, &map).or_hint(OTHER_FILE)?;
+        write(csv, |to| map.write_csv(to)).or_hint(OTHER_FILE)?;
     }
-    if let Some(path) = &args.picture {
+    if let Some(limits) = limits {
+        write(limits, |to| map.write_limits(to)).or_hint(OTHER_LIMITS)?;
+    }
+    if let Some(path) = drawing {
         let drawn = picture::draw(&map).and_then(|canvas| canvas.save(path));
-        drawn.or_hint(OTHER_PICTURE)?;
+        drawn.or_hint(OTHER_FILE)?;
     }
     Ok(())
 }
@@ -157,8 +157,11 @@ fn dampings(args: &Args) -> Vec<Damping> {
     values.into_iter().flat_map(with_each).collect()
 }
 
-fn write(mut csv: Output, map: &Map) -> Result<(), OutputError> {
-    let written = map.write_csv(&mut csv);
+fn write(
+    mut csv: Output,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let written = write(&mut csv);
     written.map_err(|source| OutputError {
         path: csv.path().to_owned(),
         source,

@@ -1,7 +1,7 @@
-//! `hapterra-lab streaming`: what terrain larger than memory costs.
+//! `hapterra-lab streaming`: the cost of terrain larger than memory.
 
 use hapterra::cli::Failure;
-use hapterra::cli::options::quantity::TIME;
+use hapterra::quantity::TIME;
 
 use super::files::{self, Files, spinner};
 use crate::report;
@@ -37,6 +37,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     if let Some(case) = &args.case {
         return streaming::measure_case(case).map_err(Failure::new);
     }
+    let (out, picture) = args.files.outputs.table_and_picture()?;
     super::warn_without_optimisation();
     let plan = plan(args)?;
     let waiting = spinner();
@@ -56,15 +57,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let room = "free some room where temporary files are, or name another place in TMPDIR";
     measured.map_err(|why| Failure::new(why).hint(room))?;
     if rows.is_empty() {
-        let hint = "the warnings above say why; name other files, or leave --files-only out";
+        let hint = "see the warnings above; name other files, or leave --files-only out";
         return Err(Failure::new("nothing was measured").hint(hint));
     }
-    files::write(args.files.out.as_ref(), |file| {
-        report::write_streaming(file, &rows)
-    })?;
-    files::write(args.files.picture.as_ref(), |file| {
-        report::draw_streaming(&rows, file)
-    })
+    files::write(out, |file| report::write_streaming(file, &rows))?;
+    files::write(picture, |file| report::draw_streaming(&rows, file))
 }
 
 /// Reads a time in whole milliseconds.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::ValueHint;
 use hapterra::cli::options::input::parse_size;
-use hapterra::cli::options::quantity::GROUND;
 use hapterra::cli::terminal::{interrupt, partial_files, progress};
 use hapterra::cli::{Failure, report};
+use hapterra::quantity::GROUND;
 use hapterra::synth::{Grid, Kind, Synth, write};
 
 /// Arguments of `hapterra-lab synth`.

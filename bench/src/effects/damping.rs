@@ -94,7 +94,7 @@ fn path_velocity(path: &TipPath, tick: usize) -> Vector {
     minus(to, from).map(|mm| mm * TICK_HZ)
 }
 
-/// Returns the tip's velocity from the encoders alone, mm/s, for each way to break ties.
+/// Returns the tip's velocity from the encoders alone, mm/s, for each rule for ties.
 fn foaw_velocities(arm: &Arm<'_>, path: &TipPath, tick: usize) -> Vec<Vector> {
     let readings: &[TipPosition] = &path.over_ground[tick + 1 - FOAW_WINDOW..=tick];
     let counts = readings[FOAW_WINDOW - 1].counts;

@@ -8,7 +8,7 @@ use hapterra_core::force::{Controller, Damping, Pattern, Shading, SurfaceParams,
 pub enum Effect {
     /// A frictionless surface.
     None,
-    /// Friction holds the tip back, at rest more than during a slide.
+    /// Friction resists the tip, at rest more than during a slide.
     Friction,
     /// The force turns gradually from patch to patch.
     Shading,
@@ -16,7 +16,7 @@ pub enum Effect {
     Grain,
     /// A micro-relief of ridges.
     Grating,
-    /// Damping takes energy from a motion against it.
+    /// Damping dissipates energy of a motion against it.
     Damping,
     /// The passivity controller dissipates the energy leak.
     Controller,

@@ -1,4 +1,4 @@
-//! The passivity controller: the energy that a surface gives to a hand that taps on it, in a closed
+//! The passivity controller: the energy that a surface adds to a hand that taps on it, in a closed
 //! loop with a virtual arm.
 
 use crate::stability::grasp::Grasp;
@@ -46,7 +46,7 @@ pub(super) fn measure(grid: &Grid) -> Result<Vec<Error>, MeasureError> {
             }
         }
         let origin = Origin(&grid.name, "a hand taps", effect.name());
-        rows.extend(origin.error(("energy that a tap gives", "mJ"), bound, gained));
+        rows.extend(origin.error(("energy added in a tap", "mJ"), bound, gained));
     }
     Ok(rows)
 }
@@ -140,7 +140,7 @@ mod tests {
 
     use crate::tick_states::terrain;
 
-    /// Returns a spring that is pushed in and out, with `more` additional stiffness on the way out.
+    /// Returns a spring that is pushed in and out, with `more` additional stiffness when pulled.
     fn spring(more: f64) -> Vec<SubTick> {
         let height = |tick: i32| 12.0 * (f64::from(tick) * 0.01).cos();
         let part = |tick: i32| {

@@ -56,7 +56,7 @@ pub fn errors(grid: &Grid, effort: Effort) -> Result<Vec<Error>, MeasureError> {
     let size = [grid.columns, grid.rows];
     if size.iter().any(|side| *side < MIN_SIDE) {
         let [columns, rows] = size;
-        let has = format!("{columns} × {rows} cells; the paths need {MIN_SIDE} each way");
+        let has = format!("{columns} × {rows} cells; the paths need {MIN_SIDE} in each direction");
         return Err(MeasureError(has));
     }
     let grid = &grid.middle(SIDE);

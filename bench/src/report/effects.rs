@@ -42,7 +42,10 @@ pub fn effects(measured: &Measured) -> String {
     for row in &measured.errors {
         if row.terrain != terrain {
             terrain = &row.terrain;
-            let _ = write!(text, "\n{terrain} — off what the formulas say\n{ERRORS}\n");
+            let _ = write!(
+                text,
+                "\n{terrain} — deviation from the formulas\n{ERRORS}\n"
+            );
         }
         let _ = writeln!(text, "{}", error(row));
     }

@@ -78,13 +78,13 @@ pub fn streaming_head() -> String {
             "turning",
             "missing ticks",
             "coarse ticks",
-            "holes",
+            "no-data",
         ]
         .map(str::to_owned),
     );
     format!(
-        "held: the fastest hand, cells/s, straight and turning; missing: ticks without their terrain at {slow}, {usual} \
-         and {fast} cells/s, straight / turning; coarse: the same ticks over a fallback; holes: ticks that it leaves without\n{names}"
+        "held: highest sustained speed of the hand, cells/s, straight and turning; missing: ticks without their terrain at {slow}, {usual} \
+         and {fast} cells/s, straight / turning; coarse: the same ticks over a fallback; no-data: ticks without terrain over a fallback\n{names}"
     )
 }
 
@@ -108,12 +108,12 @@ fn line(columns: [String; 18]) -> String {
         turning,
         missing,
         coarse,
-        holes,
+        no_data,
     ] = columns;
     format!(
         "  {terrain:<18} {read:<6} {late:>7} {link:>9} | {open:>8} {first:>9} | {peak:>7} | {requests:>8} {kb:>7} \
          | {mean:>6} {p99:>5} {tiles:>7} {host:>7} | {held:>6} {turning:>7} \
-         | {missing:<29} | {coarse:<29} {holes:>5}"
+         | {missing:<29} | {coarse:<29} {no_data:>7}"
     )
 }
 

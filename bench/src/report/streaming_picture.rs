@@ -62,7 +62,7 @@ fn panels() -> [Panel; 6] {
             Some((row.open_bytes? + row.way_bytes.unwrap_or(0)) as f64 / 1e3)
         }),
         panel("bytes a tile, mean", 1e2..1e4, |row| row.tile_bytes_mean),
-        panel("straight way held (cells/s)", 1e2..2e4, |row| {
+        panel("sustained straight speed (cells/s)", 1e2..2e4, |row| {
             row.held_straight
         }),
         panel(&missing, FLOOR..1e4, |row| {

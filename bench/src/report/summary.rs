@@ -56,7 +56,7 @@ pub fn summary(rows: &[Row]) -> String {
     let _ = writeln!(
         text,
         "  how far it is behind the closest point in sweeps of hundreds of cells a tick: {:.1e} cells\n  \
-         (a tick has its bound; the rest of the way is gone in the ticks after it)",
+         (the work of a tick is bounded; the next ticks cover the remaining distance)",
         worst(true)
     );
     for (what, rate) in TABLE_1 {

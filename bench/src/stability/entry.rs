@@ -5,7 +5,7 @@
 //!
 //! - the *swing*: the return of the tip into the surface while the rising stiffness pushes it out,
 //!   and its motion from then on;
-//! - the *energy given*: the work of the surface, less that of a spring whose stiffness rises
+//! - the *energy added*: the work of the surface, less that of a spring whose stiffness rises
 //!   equally.
 
 use hapterra_core::force::SurfaceParams;
@@ -47,12 +47,12 @@ pub enum Entry {
 pub struct EntryOutcome {
     /// The largest swing from half of the force on, mm.
     pub swing_mm: f64,
-    /// The most energy given at any moment, mJ.
+    /// The max energy added at any moment, mJ.
     pub gained_mj: f64,
 }
 
 impl EntryOutcome {
-    /// Largest permitted swing, mm, and energy given, mJ.
+    /// Largest permitted swing, mm, and energy added, mJ.
     pub const MAX_SWING_MM: f64 = 0.3;
     /// See [`Self::MAX_SWING_MM`].
     pub const MAX_GAINED_MJ: f64 = 0.05;
@@ -115,7 +115,7 @@ struct EntryObserver {
     share: f64,
     plane_mm: f64,
     is_ramping: bool,
-    /// Energy given, mJ.
+    /// Energy added, mJ.
     excess_mj: f64,
     stored_mj: Option<f64>,
     /// Time from which swings count, s.

@@ -4,12 +4,12 @@ use hapterra::phantom::HandModel;
 
 /// A grasp, from the loosest to the tightest.
 ///
-/// Identification studies give 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for fingers on
-/// a stylus, wrists more; light and firm are a stated choice at the ends of this range, and normal
-/// is [`HandModel::default`].
+/// Identification studies report 10 to 1,000 N/m and 0.5 to 5 N·s/m towards the target for fingers
+/// on a stylus, wrists more; light and firm are a stated choice at the ends of this range, and
+/// normal is [`HandModel::default`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grasp {
-    /// Two fingertips with little hold: the first grasp to be unstable.
+    /// A loose grasp with two fingertips: the first one to be unstable.
     Light,
     /// A relaxed precision grip.
     Normal,

@@ -248,7 +248,7 @@ impl Map {
     pub fn summary(&self) -> String {
         let AtTip { count_mm, .. } = self.at_tip;
         let mut lines = vec![format!(
-            "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), up to which it is held at all, and up to which force comes in well in the ramp and while the clutch closes (0.3 mm, 0.05 mJ):"
+            "stiffness in N/mm up to which a press of 1 N is still (no swing above one encoder count, {count_mm:.3} mm), up to which it is not unstable, and up to which swing and added energy are small (0.3 mm, 0.05 mJ) in the ramp and while the clutch closes:"
         )];
         let reported = |limit: Option<f64>| {
             limit.map_or_else(|| "none".to_owned(), |n_per_mm| n_per_mm.to_string())

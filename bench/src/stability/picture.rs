@@ -26,13 +26,16 @@ const GAINED_MJ: std::ops::Range<f64> = 0.01..100.0;
 const DRAWN_SPEED: usize = 1;
 const COLOURS: [RGBColor; 3] = [SERIES[1], SERIES[0], SERIES[2]];
 
-/// Draws the table.
+/// Draws the table, at the largest friction of the arm.
 ///
 /// # Errors
 /// Any error of `plotters`.
 pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
     // A row for each rate, a column for each damping; with one damping, the rates in two columns.
-    let columns = map.columns();
+    let mut columns = map.columns();
+    // Less friction of the arm hardly changes a tap.
+    let friction = columns.iter().map(|(.., part)| *part).fold(0.0, f64::max);
+    columns.retain(|(.., part)| *part == friction);
     let across = match columns.len() / map.rates().len() {
         1 => 2,
         dampings => dampings,
@@ -63,7 +66,7 @@ pub fn draw(map: &Map) -> Result<Canvas, PictureError> {
 
 fn header(area: &Area<'_>) -> Result<(), PictureError> {
     let (title, text) = (style::bold(32, &INK), style::text(20, &SOFT_INK));
-    let name = "How stiff a surface may be: energy that it gives to a tapping hand";
+    let name = "Energy that a surface adds in a tap, by its stiffness";
     axes::write(area, name, (0, px(34)), title, HPos::Left)?;
     let lines = format!(
         "taps at {} m/s; dot: a press with 1 N is still, ring: limit cycle, cross: unstable; grey: 2b/T (Colgate & Schenkel) and 2fc/Δ (Abbott & Okamura) of the arm alone",
@@ -101,7 +104,7 @@ fn chart(
     );
     let titles = Titles {
         x: &x,
-        y: "given in a tap (mJ)",
+        y: "energy of a tap (mJ)",
     };
     let mut chart = axes::chart(
         area,

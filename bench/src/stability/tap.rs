@@ -32,7 +32,7 @@ impl Grasp {
     /// Returns the speed of a hand's target at which its tip reaches the surface with a speed, one
     /// of [`TAP_SPEEDS_M_S`].
     ///
-    /// A normal or firm hand moves at its target's speed, except at the last of the three: it
+    /// A normal or firm grasp moves at its target's speed, except at the last of the three: it
     /// already slows down, since it stops 25 mm below the surface. A light grasp swings at 2 Hz
     /// during the motion, and is slower or faster than its target. Found by trials; the tests check
     /// that the speed is met.

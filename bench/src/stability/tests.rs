@@ -138,7 +138,7 @@ const LAG_S: f64 = 0.238e-3 / 2.18;
 #[test]
 fn tap_touches_the_surface_at_its_nominal_speed() {
     for grasp in Grasp::ALL {
-        // The arm's friction at rest holds a light grasp back by a varying amount.
+        // The arm's friction at rest reduces the motion of a light grasp by a varying amount.
         let tolerance = match grasp {
             Grasp::Light => 0.05,
             Grasp::Normal | Grasp::Firm => 0.015,
@@ -164,8 +164,8 @@ fn tap_touches_the_surface_at_its_nominal_speed() {
 #[test]
 fn tap_energy_is_proportional_to_age_of_the_force() {
     // The force of a tick is half a tick old on average, plus the delay to the amplifiers and the
-    // lag of the current loops. In proportion to this age it is too small on the way in and too
-    // large on the way out.
+    // lag of the current loops. In proportion to this age it is too small during the entry and too
+    // large during the exit.
     let gained = |hz: u32, delay_s| {
         let age_s = 0.5 / f64::from(hz) + delay_s + LAG_S;
         let gained_mj =
@@ -313,6 +313,16 @@ fn map_lists_each_trial_once_and_limits_are_last_good_stiffness() {
         ["0.5", "6"].map(|stiffness| format!("1000,0.0,false,{},{stiffness}", grasp.name()))
     });
     assert_eq!(begins, expected.concat());
+    let mut limits = Vec::new();
+    map.write_limits(&mut limits).expect("written");
+    let limits = String::from_utf8(limits).expect("text");
+    let [header, row] = ["tick_hz", "1000,1,"].map(|start| {
+        let line = limits.lines().find(|line| line.starts_with(start));
+        line.expect("a line").split(',').collect::<Vec<_>>()
+    });
+    let cell = |name| row[header.iter().position(|it| *it == name).expect("a column")];
+    let found = ["off_light_held", "off_firm_held", "on_firm_held"].map(cell);
+    assert_eq!(found, ["0.5", "6", ""], "{limits}");
     let limit = |grasp| {
         map.max_stiffness(
             (TickRate::DEFAULT, UNDAMPED, 1.0),
@@ -355,6 +365,7 @@ fn check_entry_limits(arm_friction: f64, delay_s: f64, table: [(u32, f64, f64); 
     }
 }
 
+/// Safety: 14.
 #[test]
 fn force_ramps_up_without_swing_or_energy_gain() {
     let all = |hz| (hz, 4.0, 4.0);
@@ -367,6 +378,7 @@ fn force_ramps_up_cleanly_with_one_millisecond_delay() {
     check_entry_limits(1.0, LONG_S, [1000, 2000, 4000, 10_000].map(all));
 }
 
+/// Safety: 14.
 #[test]
 fn ramp_up_limits_at_a_tenth_of_arm_friction_match_tables() {
     let little = [

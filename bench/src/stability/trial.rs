@@ -12,7 +12,7 @@ use hapterra::phantom::{OutOfReach, Touch};
 const PRESS_FORCE_N: f64 = 1.0;
 const PRESS_S: f64 = 2.5;
 const OBSERVED_S: f64 = 1.0;
-/// Swing of the tip from which it counts as unstable, mm: no hand holds it.
+/// Swing of the tip from which it counts as unstable, mm.
 const UNSTABLE_MM: f64 = 1.0;
 
 /// Outcome of a press.

@@ -190,7 +190,7 @@ mod tests {
         assert_eq!([raster.columns(), raster.rows()], [side; 2]);
         let grid = HapticGrid::new(&raster, HapticCells::default());
         assert_eq!(grid.cells_per_vertical_unit(), Some(1.0 / CELL_M));
-        assert!(raster.bounds().is_some(), "it knows its place");
+        assert!(raster.bounds().is_some(), "it is georeferenced");
         let synth = hapterra::synth::Synth::new(hapterra::synth::Kind::Fractal, 17, 600.0);
         for (column, row) in [(0, 0), (3071, 511), (3072, 512), (6500, 7199), (4000, 100)] {
             let height = raster.height(column, side - 1 - row);

@@ -93,9 +93,9 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn reads_of_this_process_are_counted() {
-        let before = read_by_this_process().expect("Linux tells");
+        let before = read_by_this_process().expect("Linux reports it");
         let read = std::fs::read(std::env::current_exe().expect("a path")).expect("readable");
-        let after = read_by_this_process().expect("Linux tells");
+        let after = read_by_this_process().expect("Linux reports it");
         assert!(after.bytes - before.bytes >= read.len() as u64);
         assert!(after.requests > before.requests);
         assert!(peak_bytes() > Some(1 << 20));

@@ -51,7 +51,7 @@ pub struct Plan {
     pub exponents: Vec<u32>,
     /// Latencies, ms.
     pub latencies_ms: Vec<u32>,
-    /// Steps of the bisection for the fastest speed: six give it to 9 %, four to 40 %.
+    /// Steps of the bisection for the highest speed: six find it within 9 %, four within 40 %.
     pub halvings: u32,
     /// True if virtual time stops while a block of a file is read, so that counts do not depend on
     /// the machine. A web server's latency still counts.

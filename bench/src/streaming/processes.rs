@@ -95,7 +95,7 @@ fn check_free_space(path: &Path, side: u32) -> Result<(), MeasureError> {
             let [needed, free] = [needed, free].map(|bytes| bytes as f64 / 1e6);
             let folder = folder.display();
             let text = format!(
-                "a made terrain takes up to {needed:.0} MB, and {free:.0} MB are free in {folder}"
+                "a generated terrain needs up to {needed:.0} MB, and {free:.0} MB are free in {folder}"
             );
             Err(MeasureError(text))
         }
@@ -173,7 +173,7 @@ impl Subject<'_> {
         _: &mut dyn FnMut(Row),
     ) -> Result<(), MeasureError> {
         let text = format!(
-            "{latency_ms} ms need a web server, which this build has not: build it with --features remote"
+            "{latency_ms} ms need a web server, which this build lacks: build it with --features remote"
         );
         Err(MeasureError(text))
     }
@@ -196,7 +196,8 @@ fn run(
     traffic: &mut dyn FnMut() -> Option<Traffic>,
     done: &mut dyn FnMut(Row),
 ) -> Result<(), MeasureError> {
-    let failed = |error: std::io::Error| MeasureError(format!("a process of its own: {error}"));
+    let failed =
+        |error: std::io::Error| MeasureError(format!("cannot start a separate process: {error}"));
     let program = std::env::current_exe().map_err(failed)?;
     let mut child = Command::new(program)
         .args(["streaming", "--case", &to_line(case)?])
@@ -277,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_and_cases_cross_a_pipe_as_they_are() {
+    fn rows_and_cases_pass_a_pipe_unchanged() {
         let row = Row {
             terrain: "a, \"b\" × 3".into(),
             samples: 10_000_000_000,

@@ -19,6 +19,8 @@ struct Line {
     text: String,
     /// True in a block: a whole line, to be typed unchanged.
     is_block: bool,
+    /// Text that `printf` before it writes to its standard input.
+    input: Option<String>,
 }
 
 fn pages() -> Vec<PathBuf> {
@@ -44,13 +46,21 @@ fn lines(page: &Path, text: &str) -> Vec<Line> {
         page: page.to_owned(),
         text: text.trim().trim_start_matches("$ ").to_owned(),
         is_block,
+        input: None,
+    };
+    let piped = |printf: &str, text: &str| Line {
+        input: shlex::split(printf).and_then(|words| Some(words.get(1)?.replace("\\n", "\n"))),
+        ..line(text, true)
     };
     let (mut found, mut is_code) = (vec![], false);
     for written in text.replace("\\\n", " ").lines() {
         if written.starts_with("```") {
             is_code = !is_code;
         } else if is_code || written.starts_with("    ") {
-            found.push(line(written, true));
+            found.push(match written.trim().split_once(" | ") {
+                Some((printf, text)) if printf.starts_with("printf ") => piped(printf, text),
+                _ => line(written, true),
+            });
         } else {
             found.extend(
                 written
@@ -135,13 +145,13 @@ fn cargo(words: &[String]) -> Result<(), String> {
         };
     }
     for (option, value) in words.iter().zip(words.iter().skip(1)) {
-        let manifest = match *option {
-            "--path" => repository().join(value).join("Cargo.toml"),
-            "-p" | "--package" => manifest_of(value)?,
-            _ => continue,
-        };
-        if !manifest.is_file() && !value.starts_with("..") {
-            return Err(format!("there is no {}", manifest.display()));
+        let manifest = repository().join(value).join("Cargo.toml");
+        match *option {
+            "--path" if !manifest.is_file() && !value.starts_with("..") => {
+                return Err(format!("there is no {}", manifest.display()));
+            }
+            "-p" | "--package" => drop(manifest_of(value)?),
+            _ => {}
         }
     }
     Ok(())
@@ -155,13 +165,7 @@ fn chooses_program(words: &[&str]) -> Result<(), String> {
     let Some(package) = value("-p") else {
         return Ok(());
     };
-    let folders = repository().read_dir().expect("the repository").flatten();
-    let manifests = folders.map(|folder| folder.path().join("Cargo.toml"));
-    let named = format!("name = \"{package}\"\n");
-    let manifest = manifests
-        .filter_map(|path| std::fs::read_to_string(path).ok())
-        .find(|text| text.contains(&named))
-        .unwrap_or_default();
+    let manifest = manifest_of(package)?;
     let has_choice = manifest.matches("[[bin]]").count() > 1 && !manifest.contains("default-run");
     match has_choice && value("--bin").or(value("--example")).is_none() {
         true => Err(format!("cargo cannot choose a program of {package}")),
@@ -169,17 +173,19 @@ fn chooses_program(words: &[&str]) -> Result<(), String> {
     }
 }
 
-/// Returns the manifest of a package in the workspace.
+/// Returns the text of the manifest of a package in the workspace.
 ///
 /// # Errors
 /// If there is no such package.
-fn manifest_of(name: &str) -> Result<PathBuf, String> {
-    let locked = include_str!("../../../Cargo.lock");
-    let manifest = repository().join("Cargo.toml");
-    let known = locked.contains(&format!("name = \"{name}\"\nversion = \"0.1.0\"\ndep"));
-    known
-        .then_some(manifest)
-        .ok_or_else(|| format!("there is no package {name}"))
+fn manifest_of(package: &str) -> Result<String, String> {
+    let workspace = include_str!("../../../Cargo.toml");
+    let members = workspace.lines().find(|line| line.starts_with("members"));
+    let folders = members.unwrap_or_default().split('"').skip(1).step_by(2);
+    let named = format!("[package]\nname = \"{package}\"\n");
+    folders
+        .filter_map(|it| std::fs::read_to_string(repository().join(it).join("Cargo.toml")).ok())
+        .find(|manifest| manifest.contains(&named))
+        .ok_or_else(|| format!("there is no package {package}"))
 }
 
 fn check(line: &Line) -> Result<(), String> {
@@ -221,7 +227,8 @@ fn wrong_lines_are_found() {
                 cargo xtask view --tset\ncargo install --locked --path no/where\n```\n\
                 Text with `hapterra stability`, `cargo run -p nothing` and `cargo run -r -p hapterra-tests`.\n";
     let right = "```sh\nhapterra info FILE --json  # a comment\nhapterra run FILE --device \\\n  native\n\
-                 cargo xtask test -- --test link\ncargo install --locked --path host-tools\n```\n\
+                 cargo xtask test -- --test link\ncargo install --locked --path host-tools\n\
+                 printf 'mark a\\n' | hapterra run FILE --commands -\n```\n\
                  Text with `hapterra run`, `hapterra.read()` and `cargo run -r -p hapterra-lab -- synth`.\n";
     let found = |text: &str| {
         let lines = lines(Path::new("page.md"), text);
@@ -231,5 +238,7 @@ fn wrong_lines_are_found() {
         )
     };
     assert_eq!(found(page), (8, 8));
-    assert_eq!(found(right), (6, 0));
+    assert_eq!(found(right), (7, 0));
+    let piped = lines(Path::new("page.md"), right).remove(4);
+    assert_eq!(piped.input.as_deref(), Some("mark a\n"));
 }

@@ -19,7 +19,7 @@ fn stability_prints_limits_and_writes_trials_and_picture() {
     let [csv, png] = ["trials.csv", "limits.png"].map(|name| folder.path().join(name));
     let [to_csv, to_png] = [&csv, &png].map(|path| path.to_str().expect("text"));
     let words = ["--rate", "2000,1000", "--stiffness", "0.5", "-o", to_csv];
-    let output = stability(&[&words[..], &["--picture", to_png]].concat());
+    let output = stability(&[&words[..], &["-o", to_png]].concat());
     assert!(output.status.success(), "{}", output_text(&output));
     for part in [
         "  1000 Hz, no damping:                0.1 of the arm's friction: light 0.5 / 0.5 / none",
@@ -48,9 +48,9 @@ fn stability_prints_limits_and_writes_trials_and_picture() {
 
 #[test]
 fn invalid_options_and_unwritable_outputs_are_refused() {
-    let twice = stability(&["-o", "both", "--picture", "both"]);
+    let twice = stability(&["-o", "a.csv", "-o", "b.csv"]);
     assert!(
-        output_text(&twice).contains("cannot be one file"),
+        output_text(&twice).contains("two files with the same ending"),
         "{}",
         output_text(&twice)
     );
@@ -60,6 +60,8 @@ fn invalid_options_and_unwritable_outputs_are_refused() {
         (["--stiffness", "nan"], 2, "N/mm"),
         (["--delay", "20ms"], 2, "from 0 to 0.01 s"),
         (["--delay-us", "200"], 2, "is now --delay 200us"),
+        (["--picture", "a.png"], 2, "is now -o FILE.png"),
+        (["-o", "both"], 2, ".csv (all figures) or .png (a picture)"),
         (["--damping", "21"], 2, "0 to 20 N·s/m"),
         (["--damping", "nan"], 2, "a damping"),
         (["--passivity", "auto"], 2, "off, on"),
@@ -68,11 +70,7 @@ fn invalid_options_and_unwritable_outputs_are_refused() {
             1,
             "cannot write /nowhere/at/all.csv",
         ),
-        (
-            ["--picture", "/nowhere/at/all.png"],
-            1,
-            "/nowhere/at/all.png",
-        ),
+        (["-o", "/nowhere/at/all.png"], 1, "/nowhere/at/all.png"),
     ] {
         let output = stability(&words);
         assert_eq!(output.status.code(), Some(code), "{}", output_text(&output));

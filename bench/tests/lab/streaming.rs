@@ -111,7 +111,7 @@ fn small_file_is_reported_and_the_other_is_measured() {
     let names = [&hills, &small, &png].map(|path| path.to_str().expect("text"));
     let (done, text, csv) = streamed(
         "files.csv",
-        &["--files-only", names[0], names[1], "--picture", names[2]],
+        &["--files-only", names[0], names[1], "-o", names[2]],
     );
     assert!(done, "{text}");
     assert!(

@@ -1,6 +1,6 @@
 //! The budget of a tick, in work units.
 //!
-//! Each piece of work first checks that the budget has its units, and waits for the next tick if
+//! Each operation first checks that the budget has its work units, and waits for the next tick if
 //! not. All work is counted, with or without this check, so a missing check shows as a tick that
 //! spent more than [`WORK_PER_TICK`]; the randomised stress test and the fuzz target look for such
 //! ticks. `bench/instructions-m4f.csv` lists the measured instructions of a Cortex-M4F for each
@@ -63,8 +63,8 @@ pub(super) const INTERSECTION: u32 = 8;
 
 /// Units for entering a patch on a border, and for the slopes into its four neighbours.
 pub(super) const BORDER_ENTRY: u32 = PATCH_ENTRY + 4 * SLOPE;
-/// Units of the largest piece of work. A tick that postponed work has spent more than its budget
-/// minus this.
+/// Units of the largest operation. A tick that postponed work has spent more than its budget minus
+/// this.
 pub const MAX_ATOMIC_WORK: u32 = BORDER_ENTRY;
 
 /// Work of a tick, its limit, and the first missing tile.

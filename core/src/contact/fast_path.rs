@@ -2,8 +2,8 @@
 //!
 //! Each returns the same bits as the full contact (`proxy`), or nothing: a test
 //! (`fast_paths_change_no_bit`) and the randomised stress test run scenes with and without them.
-//! `bench/instructions-m4f.csv` shows what they save: compare a sliding tick on the fast path with
-//! a first contact.
+//! `bench/instructions-m4f.csv` shows the saved instructions: compare a sliding tick on the fast
+//! path with a first contact.
 
 use glam::Vec3;
 
@@ -32,7 +32,7 @@ pub(super) fn is_free<const D: usize>(
 pub(super) struct PatchFollower {
     /// Place where it rests.
     pub(super) point: SurfacePoint,
-    /// A cell that surely holds a patch: while the HIP is over it, nothing fades.
+    /// A cell that surely has a patch: while the HIP is over it, nothing fades.
     over: Cell,
     /// The patch, and the base of its heights in whole cells.
     patch: Patch,

@@ -3,7 +3,7 @@
 //!
 //! [`Contact::step`] receives the HIP of one tick and returns the proxy. Reading order: `proxy`
 //! (the phases of a tick), [`sweep`] (from free space to the surface), [`closest_point`] (over the
-//! surface), `friction` (what holds the proxy back), [`edge_fade`] (at the border of the data); all
+//! surface), `friction` (resistance to its slide), [`edge_fade`] (at the border of the data); all
 //! use [`surface`]. `tolerance` defines how exact each is, `budget` limits the work of a tick, and
 //! `fast_path` handles nearly every tick.
 

@@ -87,7 +87,7 @@ fn check(name: &str, height: fn(i32, i32) -> f32, slope: f64, path: &[[f64; 3]])
         while !output.converged {
             output = contact.step(&field.window, &hip);
             ticks += 1;
-            assert!(ticks < 5000, "{name} {tick}: never settles {output:?}");
+            assert!(ticks < 5000, "{name} {tick}: does not converge {output:?}");
         }
         let (x, proxy) = (position(&hip), position(&output.proxy));
         counts[output.state as usize] += 1;
@@ -416,7 +416,7 @@ fn contact_invariants_hold_on_spikes_and_no_data() {
             &wander(seed, cases(1000, 20), 0.5, 0.0, 1.5),
         );
         check(
-            "holes",
+            "no-data",
             holes,
             2.0,
             &wander(seed, cases(2000, 40), 0.2, 1.0, 1.5),
@@ -441,7 +441,7 @@ fn contact_invariants_hold_when_the_hip_jumps() {
             &teleport(seed, cases(300, 15), 1.0, 2.0),
         );
         check(
-            "holes",
+            "no-data",
             holes,
             2.0,
             &teleport(seed, cases(300, 15), 1.0, 2.0),
@@ -621,7 +621,10 @@ fn fast_paths_change_no_bit() {
         ticks += 1;
         shorter += u32::from(with.work < without.work);
     });
-    assert!(shorter > ticks / 10, "{shorter} of {ticks} took a shortcut");
+    assert!(
+        shorter > ticks / 10,
+        "{shorter} of {ticks} used a fast path"
+    );
 }
 
 #[test]

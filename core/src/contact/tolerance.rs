@@ -8,13 +8,14 @@
 pub(super) const RESOLUTION: f32 = 1.2e-7;
 /// Maximum of the same, for a HIP so far away that its coordinates resolve no better.
 pub(super) const COARSEST_RESOLUTION: f32 = 0.25;
-/// Length below which a step is not taken: a coordinate near 1 cannot resolve it.
+/// Length below which a step is omitted: a coordinate near 1 cannot resolve it.
 pub(super) const MIN_STEP: f32 = 6e-8;
 /// Length below which a Newton step may be rounding alone, and is compared with the rounding of its
 /// slope.
 pub(super) const DOUBTFUL_STEP: f32 = 1e-3;
-/// Distance from a patch's border within which a place of a convex patch counts as neither inside nor
-/// on it, ten times the error of its closest point. The tolerance for "on the border" is [`BESIDE`].
+/// Distance from a patch's border within which a place of a convex patch counts as neither inside
+/// nor on it, ten times the error of its closest point. The tolerance for "on the border" is
+/// [`BESIDE`].
 pub(super) const BORDER: f32 = 1e-6;
 /// Distance from an edge, in multiples of the resolution, within which a place is beside it and the
 /// patch beyond is searched as well.

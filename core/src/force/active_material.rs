@@ -3,8 +3,8 @@
 //! The target is the material of the sample nearest to the proxy. The rendered parameters reach it
 //! within [`MATERIAL_CHANGE_S`]: stiffness, damping and friction change by the same amount in each
 //! tick, and a texture by its share: the old one fades out in the first half, the new one fades in
-//! during the second. A proxy that lands from the air starts with its material at once, because no
-//! force was rendered before.
+//! during the second. A proxy that touches the ground from the air starts with its material at
+//! once, because no force was rendered before.
 
 use super::material::{MATERIAL_CHANGE_S, Material, MaterialTable};
 use super::{SurfaceParams, Texture, Texturer};

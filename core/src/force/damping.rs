@@ -7,8 +7,8 @@ use super::passivity::{DampingCoefficients, MAX_MJ, Motion, Passivity, Passivity
 use super::{EffectContext, SurfaceParams, clamp_length};
 use crate::scalar::{larger, smaller};
 
-/// Energy that a shaded force may give before an edge, and take beyond it, before its turn is
-/// reduced. It is a fraction of the force times the sum of a cell and the depth. An edge gives a
+/// Energy that a shaded force may release before an edge, and absorb beyond it, before its turn is
+/// reduced. It is a fraction of the force times the sum of a cell and the depth. An edge releases a
 /// quarter of its bend times the part of a cell on which the force turns ([`super::shading`]): this
 /// much at 23°, twice as much at 45°, the maximum.
 const EDGE_ENERGY_SHARE: f32 = 0.1;
@@ -97,10 +97,10 @@ impl Damper {
 
     /// Returns the share of a shaded force's turn that is rendered at a depth.
     ///
-    /// A turned force is not that of a spring: around a closed path it can give energy, and damping
-    /// along the force does not dissipate energy from motion across it. The force gives before an
-    /// edge what it takes beyond, so the full turn is rendered until more energy was created than
-    /// an edge gives.
+    /// A turned force is not that of a spring: around a closed path it can release energy, and
+    /// damping along the force does not dissipate energy from motion across it. The force absorbs
+    /// beyond an edge the energy that it releases before it, so the full turn is rendered until
+    /// more energy was created than an edge releases.
     pub(crate) fn turn_share(&self, depth_mm: f32, cell_mm: f32) -> f32 {
         let spring_n = smaller(
             depth_mm * self.params.stiffness_n_per_mm,
@@ -117,7 +117,7 @@ impl Damper {
     }
 
     /// Resets the controller while no force, or less than the spring's force, is rendered: energy
-    /// created before is forgotten.
+    /// created before is discarded.
     pub(crate) fn reset(&mut self) {
         if let Some(controller) = &mut self.controller {
             controller.reset();

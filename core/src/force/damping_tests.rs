@@ -97,6 +97,7 @@ fn created_mj_with(ramps: impl Fn(u16) -> Shares) -> [f32; 2] {
     [at_rest.unwrap_or_default(), at(100, -1.5, 0.5)]
 }
 
+/// Safety: 14.
 #[test]
 fn ramp_and_clutch_record_only_energy_of_the_motion() {
     let share = |tick: u16| 0.01 * f32::from(tick.min(50) + 1);
@@ -112,7 +113,7 @@ fn ramp_and_clutch_record_only_energy_of_the_motion() {
     ] {
         let [at_rest, leaving] = created_mj_with(|tick| ramps(share(tick)));
         assert_eq!(at_rest, 0.0);
-        // 2 N acted over 0.5 mm, and 0.51 of the spring gave 0.51 · ½ (2² − 1.5²).
+        // 2 N acted over 0.5 mm, and 0.51 of the spring released 0.51 · ½ (2² − 1.5²).
         let released_mj = 2.0 * 0.5 - 0.51 * 0.5 * (4.0 - 2.25);
         assert!(
             (leaving - released_mj).abs() < 1e-5,
@@ -127,9 +128,10 @@ fn ramp_and_clutch_record_only_energy_of_the_motion() {
     assert!((at_rest - 0.5 * 0.5 * 4.0).abs() < 1e-5, "{at_rest} mJ");
 }
 
+/// Safety: 14.
 #[test]
 fn damping_scales_with_the_rendered_share_of_the_spring() {
-    // Energy created by half of a spring takes as much damping per newton as by all of one.
+    // Energy created by half of a spring requires as much damping per newton as by all of one.
     let damped = |shares: Shares| {
         let params = params(1.0, 0.0, Controller::On);
         let mut damper = damper(&params, 1000).expect("controlled");
@@ -195,8 +197,8 @@ impl Taps {
         }
     }
 
-    /// Energy that the surface gives in each of a few taps, mJ, integrated a hundred times a tick.
-    /// The force obeys the guard's rate limit.
+    /// Energy that the surface releases in each of a few taps, mJ, integrated a hundred times a
+    /// tick. The force obeys the guard's rate limit.
     fn released_mj(self, params: &SurfaceParams) -> Vec<f64> {
         const DEEP_MM: f64 = 3.0;
         let mut damper = Damper::of(params, &context(self.hz, self.reported_s as f32));
@@ -267,7 +269,7 @@ fn passivity_controller_removes_the_energy_of_every_tap() {
     }
 }
 
-/// Energy, mJ, that a point which holds the proxy gives in a second to a tip on circles of 4 mm
+/// Energy, mJ, that a point with a fixed proxy releases in a second to a tip on circles of 4 mm
 /// around it at 200 mm/s: no motion is along the force.
 fn released_on_circles_mj(params: &SurfaceParams, hz: u32) -> f64 {
     const RADIUS_MM: f64 = 4.0;
@@ -340,16 +342,19 @@ fn shaded_or_textured_force_is_not_damped_sideways() {
 fn energy_of_unstated_latency_is_not_all_dissipated() {
     // So a board must state the latency of itself and of its amplifiers.
     let on = params(1.0, 0.0, Controller::On);
-    let known = Taps::new(1000, 1.1e-3);
-    let unknown = Taps {
+    let stated = Taps::new(1000, 1.1e-3);
+    let unstated = Taps {
         reported_s: 0.1e-3,
-        ..known
+        ..stated
     };
-    let without = known.released_mj(&params(1.0, 0.0, Controller::Off));
-    let (known, unknown) = (known.released_mj(&on), unknown.released_mj(&on));
-    for ((known, unknown), without) in known.iter().zip(&unknown).zip(&without) {
-        assert!(*known < 0.0, "{known} mJ");
-        assert!(*unknown > 0.2 * without, "{unknown} mJ, {without} without");
+    let without = stated.released_mj(&params(1.0, 0.0, Controller::Off));
+    let (stated, unstated) = (stated.released_mj(&on), unstated.released_mj(&on));
+    for ((stated, unstated), without) in stated.iter().zip(&unstated).zip(&without) {
+        assert!(*stated < 0.0, "{stated} mJ");
+        assert!(
+            *unstated > 0.2 * without,
+            "{unstated} mJ, {without} without"
+        );
     }
 }
 
@@ -394,10 +399,10 @@ fn net_dissipation_stays_below_the_created_energy() {
             let taps = Taps::new(hz, latency_s);
             let without = taps.released_mj(&params(1.0, 0.0, Controller::Off));
             let with = taps.released_mj(&params(1.0, 0.0, Controller::On));
-            for (released_mj, taken) in without.iter().zip(&with) {
+            for (released_mj, dissipated) in without.iter().zip(&with) {
                 assert!(
-                    -taken < *released_mj,
-                    "{hz} Hz: {taken} mJ, {released_mj} without"
+                    -dissipated < *released_mj,
+                    "{hz} Hz: {dissipated} mJ, {released_mj} without"
                 );
             }
         }

@@ -93,7 +93,7 @@ fn shading_turn_shrinks_as_controller_dissipates_more() {
 
 #[test]
 fn max_observed_energy_suppresses_the_shading_turn() {
-    // A cell of a metre: an edge gives more than the observer records.
+    // A cell of a metre: an edge releases more than the observer records.
     let damper = |created_mj: f32| {
         let mut effects = Effects::of(&PARAMS, &context()).expect("shaded");
         created(&mut effects, created_mj);

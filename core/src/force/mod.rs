@@ -1,10 +1,11 @@
 //! From proxy and haptic interface point to newtons.
 //!
-//! - `material`, `active_material`: surface parameters, and the change from one material to another;
+//! - `material`, `active_material`: surface parameters, and the change from one material to
+//!   another;
 //! - `shading`, `slopes`: the force turned evenly from patch to patch;
 //! - `texture`, `texturer`, `relief`: grain and gratings: parameters, force and heights;
-//! - `damping`, `passivity`, `rate_limit_softening`, `depth`: damping along the force, the passivity
-//!   observer and controller, and the softening of a fast contact;
+//! - `damping`, `passivity`, `rate_limit_softening`, `depth`: damping along the force, the
+//!   passivity observer and controller, and the softening of a fast contact;
 //! - `effects`, `effect_context`: all of these for a scene.
 
 mod active_material;
@@ -121,7 +122,7 @@ impl Spring {
     /// Returns the force in newtons for a proxy `displacement_mm` away from the HIP.
     ///
     /// It points along `displacement_mm`, is proportional to its length, and is clamped as a
-    /// vector. Always finite: a displacement that is not finite gives no force.
+    /// vector. Always finite: a displacement that is not finite results in no force.
     #[must_use]
     pub fn force_n(&self, displacement_mm: Vec3) -> Vec3 {
         clamp_length(displacement_mm * self.stiffness_n_per_mm, self.max_force_n)
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn non_finite_displacement_gives_no_force() {
+    fn non_finite_displacement_renders_no_force() {
         for bad in [f32::NAN, f32::INFINITY] {
             assert_eq!(
                 SurfaceParams::PREMIUM

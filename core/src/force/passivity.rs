@@ -3,10 +3,10 @@
 //!
 //! An ideal spring returns no more energy than it received. A spring that is rendered in ticks
 //! does: its force belongs to the start of the tick and acts a latency L later, so it is too small
-//! on the way in and too large on the way out. This gives K (T / 2 + L) v per metre. The observer
-//! adds up the work of the forces that acted, each at its time, and compares the sum with the
-//! energy of an ideal spring at this depth; the excess was created. So the leak is known while the
-//! tip moves in, and not only after it has left.
+//! while the tip moves in and too large while it moves out. This creates K (T / 2 + L) v per metre.
+//! The observer adds up the work of the forces that acted, each at its time, and compares the sum
+//! with the energy of an ideal spring at this depth; the excess was created. So the leak is
+//! measured while the tip moves in, and not only after it has left.
 //!
 //! The damping of the controller also acts a latency later, so the controller predicts: the next
 //! forces are known, and the tip is assumed to keep its velocity. It adds the damping that
@@ -19,10 +19,10 @@ use super::rate_limit_softening::RateLimitSoftening;
 use super::{EffectContext, Spring, SurfaceParams};
 use crate::scalar::{larger, smaller};
 
-/// Maximum recorded energy, mJ; more is forgotten.
+/// Maximum recorded energy, mJ; more is dropped.
 pub(super) const MAX_MJ: f32 = 2.0;
 /// Maximum damping, as ticks of the stiffness, in addition to the latency. The velocity has an
-/// error of some 0.1 count a tick, which gives a force of this many times the spring's force for
+/// error of some 0.1 count a tick, which causes a force of this many times the spring's force for
 /// 0.1 count.
 const MAX_TICKS: f32 = 2.0;
 /// The same across the force: a uniform motion creates half of the energy that this dissipates.
@@ -98,7 +98,7 @@ pub(crate) struct PassivityInputs {
     pub(crate) velocity_mm_s: Vec3,
     /// The force that the guard let through in the last tick.
     pub(crate) commanded_n: Vec3,
-    /// The maximum force that the guard lets through.
+    /// The maximum force that the guard permits.
     pub(crate) max_n: f32,
     /// Shares of the spring's force in this tick.
     pub(crate) shares: Shares,
@@ -161,7 +161,7 @@ impl Passivity {
     }
 
     /// Records the energy since the last tick, and predicts the energy until this tick's force has
-    /// acted for a tick, without the work of that force. Lost energy gives no credit.
+    /// acted for a tick, without the work of that force. Lost energy is not credited.
     ///
     /// The spring is the one of the force after the guard: the scene's, times all shares. A spring
     /// that becomes stiffer adds energy. For ramp and clutch this is intended, once each, and not

@@ -3,8 +3,9 @@
 //!
 //! The guard limits the change of a force to [`MAX_SLEW_N_PER_S`]. A spring that is touched faster
 //! would exceed it: its force rises late and falls late, and the tip receives more energy than it
-//! gave. Damping cannot dissipate that, since the same limit delays the damping force. A spring
-//! that is softer from contact onset on stays within the limit, and returns only what it received.
+//! supplied. Damping cannot dissipate that, since the same limit delays the damping force. A spring
+//! that is softer from contact onset on stays within the limit, and returns no more energy than it
+//! received.
 
 use super::Spring;
 use super::depth::Depth;

@@ -178,7 +178,7 @@ fn heights_and_slopes_reach_but_never_exceed_their_bounds() {
 }
 
 #[test]
-fn each_seed_gives_another_texture() {
+fn each_seed_selects_another_texture() {
     let at = GridPoint::new([5, 6, 7], Vec3::new(0.3, 0.2, 0.1));
     for pattern in [Pattern::Grain, Pattern::Grating] {
         let heights: [f32; 20] = core::array::from_fn(|seed| {

@@ -68,7 +68,8 @@ impl Shader {
     /// for height in [1.0, 0.0] {
     ///     contact.step(&window, &GridPoint::new([20, 20, 0], Vec3::new(0.1, 0.5, height)));
     /// }
-    /// // A tenth of a cell east of the bottom the force leans west, but for a tenth.
+    /// // A tenth of a cell east of the bottom, the west component is less than a fifth of the
+    /// // plain one.
     /// let (plain, shaded) = (contact.output().displacement, shader.shade(&window, &contact));
     /// assert!((shaded.length() - plain.length()).abs() < 1e-6);
     /// assert!(shaded.x.abs() < 0.2 * plain.x.abs());

@@ -33,7 +33,7 @@ pub(crate) struct SlopesAt {
     pub(crate) north: [f32; 2],
     /// Slopes that change gradually from patch to patch.
     pub(crate) smoothed: Slopes,
-    /// A missing tile that holds a sample beside the patch. The surface then counts as ending
+    /// A missing tile that contains a sample beside the patch. The surface then counts as ending
     /// before it.
     pub(crate) missing: Option<TileIndex>,
 }

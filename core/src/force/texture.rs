@@ -58,7 +58,7 @@ impl Texture {
     /// Speed up to which a wave must be rendered in full, mm/s: that of a finger that explores
     /// slowly.
     const SLOW_MM_S: f32 = 50.0;
-    /// Valid wavelengths per cell, which places can be counted in.
+    /// Valid wavelengths per cell: a position can be counted in them.
     const WAVES_PER_CELL: (f32, f32) = (1.0 / 1_048_576.0, 1_048_576.0);
 
     /// Returns true if there is no texture.

@@ -99,7 +99,7 @@ fn grating_vibrates_only_at_speed_over_wavelength() {
     }
 }
 
-/// Grain has no waves shorter than its wavelength, except what its smooth rises need.
+/// Grain has no waves shorter than its wavelength, except those of its smooth rises.
 #[test]
 fn grain_reaches_the_frequency_of_its_wavelength() {
     let rendered = rendered(&GRAIN, 50.0, 1.0, cases(20_000, 400));
@@ -249,7 +249,7 @@ fn tangential_stiffness_stays_below_the_surface_stiffness() {
 }
 
 /// Up to the depth limit of the component along the surface, the force is that of a spring on the
-/// surface with its relief: a closed path gives no energy.
+/// surface with its relief: a closed path releases no energy.
 #[test]
 fn closed_loop_over_a_texture_releases_no_energy() {
     for texture in [GRATING, GRAIN] {
@@ -358,7 +358,7 @@ fn texture_output_is_finite_for_non_finite_input() {
                 .force_n(rendered);
             assert!(force.is_finite(), "{bad}: {force}");
         }
-        // And the speed is forgotten.
+        // And the speed is cleared.
         let rendered: Vec<_> = (0..100)
             .map(|_| texturer.add(Vec3::Z, &place(0.3, 0.3)))
             .collect();

@@ -20,7 +20,7 @@ impl GridPoint {
     ///
     /// `offset` may lie outside `[0, 1)`; whole cells are carried over. A
     /// component that is not a number counts as zero, and cells are clamped to
-    /// ±[`MAX_CELL`], so that any input gives a valid point.
+    /// ±[`MAX_CELL`], so that any input results in a valid point.
     #[must_use]
     pub fn new(cell: [i32; 3], offset: Vec3) -> Self {
         let (x, fx) = carry(cell[0], offset.x);
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fast_paths_of_carry_give_the_same_bits() {
+    fn fast_paths_of_carry_return_the_same_bits() {
         let mut offsets = std::vec![
             0.0,
             1.0,

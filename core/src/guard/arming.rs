@@ -1,4 +1,4 @@
-//! The steps from off to on and back, and their time-outs.
+//! The conditions and times of each change of the mode, and the gain of the force's ramps.
 
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +145,7 @@ impl Arming {
         }
     }
 
-    /// Advances the confirmation; `small` is true if the wanted force is small.
+    /// Advances the confirmation; `small` is true if the commanded force is small.
     pub(super) fn confirm(&mut self, small: bool) {
         if !small {
             self.since = 0;

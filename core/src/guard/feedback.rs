@@ -12,7 +12,7 @@ const ENABLE_MS: u32 = 10;
 const SPIKE_MS: u32 = 2;
 /// Time constant of the comparison of currents, ms. With half of this value, an amplifier that
 /// reads duty cycles at 1 kHz follows the fastest change of force (5.5 A in 8 ms, each current 1 ms
-/// late) without coming near the tolerance.
+/// late) well within the tolerance.
 const COMPARE_MS: u32 = 20;
 
 /// Maximum difference of a measured current from its command, A, averaged over the comparison's 20

@@ -70,7 +70,7 @@ pub(super) struct ActiveJog {
 }
 
 impl ActiveJog {
-    /// Creates a jog; an invalid axis or a current that is not a number gives no current.
+    /// Creates a jog; an invalid axis or a current that is not a number results in no current.
     pub(super) fn new(jog: Jog, rate: TickRate) -> Self {
         let axis = Vec3::AXES.get(usize::from(jog.axis));
         let axis = axis.copied().unwrap_or(Vec3::ZERO);

@@ -70,6 +70,7 @@ fn held_joint(current: Vec3) -> [i32; 3] {
     [0, i32::from((0.05..0.052).contains(&-current.y)), 0]
 }
 
+/// Safety: 16.
 #[test]
 fn jog_drives_only_its_motor_at_its_current_and_duration() {
     for rate in [1_000, 10_000].map(|hz| TickRate::new(hz).expect("in range")) {
@@ -122,6 +123,8 @@ fn jog_needs_a_press_and_is_not_repeated() {
 }
 
 /// Also without a tick in between, and in the tick after the fade-out.
+///
+/// Safety: images.
 #[test]
 fn plain_arm_command_does_not_arm_for_an_earlier_jog() {
     let mut storage = TileArena::<1>::new();
@@ -173,6 +176,7 @@ fn dead_man_release_ends_a_jog_within_the_tick() {
     assert_eq!(bench.report().fault, Some(Fault::DeadManReleased));
 }
 
+/// Safety: 16.
 #[test]
 fn runaway_of_any_joint_is_a_fault() {
     for axis in 0..3 {
@@ -197,6 +201,7 @@ fn runaway_of_any_joint_is_a_fault() {
     }
 }
 
+/// Safety: 16.
 #[test]
 fn stationary_encoder_is_detected_at_half_the_current() {
     for motion in [
@@ -215,6 +220,7 @@ fn stationary_encoder_is_detected_at_half_the_current() {
     }
 }
 
+/// Safety: 16.
 #[test]
 fn out_of_range_jog_is_invalid_and_stays_bounded() {
     for (axis, current_a, hold_ms) in [

@@ -5,8 +5,8 @@
 //! force; [`Guard::limit_currents`] limits the currents.
 //!
 //! [`Fault`]s are latched and switch the amplifiers off. [`Limits`] are the reasons for a reduced
-//! force. [`Blockers`] are the reasons why the arm cannot be armed. [`Mode`] has the steps from off
-//! to on and back.
+//! force. [`Blockers`] are the reasons why the arm cannot be armed. [`Mode`] is the progress of
+//! arming.
 
 mod arming;
 mod blockers;
@@ -53,7 +53,7 @@ use thermal::{Motors, Temperatures};
 pub const WORKING_SHARE: f32 = 0.9;
 /// Maximum counts of an encoder in a second: about 3 m/s at the tip of a Premium 1.5.
 pub const MAX_COUNTS_PER_S: u32 = 128_000;
-/// Tolerance of a joint's limits, rad: stops yield, and limits are measured by hand.
+/// Tolerance of a joint's limits, rad: stops are compliant, and limits are measured by hand.
 pub const LIMIT_MARGIN_RAD: f32 = 0.087;
 
 /// Inputs of the guard: encoders, safety inputs and amplifiers.
@@ -129,7 +129,7 @@ pub struct Report {
     pub decision: Decision,
 }
 
-/// The guard between the wanted force and the amplifiers.
+/// The guard between the commanded force and the amplifiers.
 ///
 /// ```
 /// use hapterra_core::Vec3;
@@ -255,15 +255,15 @@ impl Guard {
         self.force_n
     }
 
-    /// Returns the maximum force that the guard lets through, N.
+    /// Returns the maximum force that the guard permits, N.
     #[must_use]
     pub const fn max_force_n(&self) -> f32 {
         self.max_force_n
     }
 
     /// Returns the next shares of [`Guard::limit_force`]: those of the ramp and of the speed limit.
-    /// `None` while the force does not follow the wanted force: with the amplifiers off, and during
-    /// the fade-out.
+    /// `None` while the force does not follow the commanded force: with the amplifiers off, and
+    /// during the fade-out.
     #[must_use]
     pub fn shares(&self) -> Option<[f32; 2]> {
         let ramp = self.arming.next_gain()?;
@@ -305,14 +305,14 @@ impl Guard {
         self.stop();
     }
 
-    /// Clears the fault like [`Self::clear`], if it is the one that the user has seen.
+    /// Clears the fault like [`Self::clear`], if it is the one that was shown to the user.
     pub fn clear_if_acknowledged(&mut self, acknowledged: Option<Fault>) {
         if self.fault.is_none() || self.fault == acknowledged {
             self.clear();
         }
     }
 
-    /// Requests arming. An earlier jog that has not driven a motor is forgotten; an active one
+    /// Requests arming. An earlier jog that has not driven a motor is cleared; an active one
     /// continues.
     pub fn arm(&mut self) {
         self.hold.end();

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 ///    ▲                  ▲            let go         │                        │ 2 s
 ///    │                  └───────────────────────────┘                        ▼
 ///    │  0.1 s                                                              Armed
-///    └──────────── Fading ◀──────────────── disarm, goodbye ─────────────────┘
+///    └──────────── Fading ◀──────────────── disarm, bye ─────────────────────┘
 /// ```
 ///
 /// From every mode a fault leads to `Disarmed` within the tick.

@@ -103,6 +103,7 @@ impl Bench {
     }
 }
 
+/// Safety: 1.
 #[test]
 fn guard_boots_disarmed_and_stays_so_for_any_force() {
     let mut bench = Bench::new();
@@ -114,6 +115,7 @@ fn guard_boots_disarmed_and_stays_so_for_any_force() {
     assert_eq!(bench.modes, [Mode::Disarmed]);
 }
 
+/// Safety: 1.
 #[test]
 fn each_blocker_alone_refuses_arming_and_is_reported() {
     type Case = (fn(&mut Bench), Blockers);
@@ -157,6 +159,7 @@ fn each_blocker_alone_refuses_arming_and_is_reported() {
     }
 }
 
+/// Safety: 2.
 #[test]
 fn dead_man_switch_held_since_boot_does_not_arm() {
     let mut bench = Bench::new();
@@ -301,6 +304,8 @@ fn modes_change_only_through_their_listed_exits() {
 }
 
 /// Failures while armed, and the faults that they must latch within the tick.
+///
+/// Safety: 13, response times.
 #[test]
 fn each_fault_switches_off_in_its_tick_and_latches() {
     type Case = (fn(&mut Bench), Fault);
@@ -360,6 +365,7 @@ fn first_fault_is_kept() {
     assert_eq!(bench.guard.report().fault, Some(Fault::EmergencyStop));
 }
 
+/// Safety: 8, response times.
 #[test]
 fn joint_limits_and_linkage_trip_while_armed() {
     // Turned outwards slowly until a fault: a count is 0.1 mrad.
@@ -383,6 +389,7 @@ fn joint_limits_and_linkage_trip_while_armed() {
     assert_eq!(turned(2, -1).0, Some(Fault::JointLimit));
 }
 
+/// Safety: 8.
 #[test]
 fn encoder_jump_of_a_zeroed_arm_faults_and_clears_the_zero() {
     let mut bench = Bench::new();
@@ -391,7 +398,7 @@ fn encoder_jump_of_a_zeroed_arm_faults_and_clears_the_zero() {
     bench.tick();
     bench.sense.counts = [0; 3];
     bench.tick();
-    assert_eq!(bench.guard.report().fault, None, "nothing is known yet");
+    assert_eq!(bench.guard.report().fault, None, "nothing is measured yet");
     bench.zeroed = true;
     bench.ticks(2);
     bench.sense.counts = [128, -128, 0];
@@ -415,6 +422,7 @@ fn encoder_jump_limit_scales_with_the_tick_period() {
     assert_eq!(bench.guard.report().fault, Some(Fault::EncoderJump));
 }
 
+/// Safety: 10.
 #[test]
 fn force_clamp_keeps_direction_and_is_reported() {
     let mut bench = Bench::armed();
@@ -426,6 +434,7 @@ fn force_clamp_keeps_direction_and_is_reported() {
     assert!(bench.guard.report().limits.contains(Limits::FORCE_CLAMPED));
 }
 
+/// Safety: 10.
 #[test]
 fn slew_limit_bounds_force_change_and_is_reported() {
     let mut bench = Bench::armed();
@@ -438,6 +447,7 @@ fn slew_limit_bounds_force_change_and_is_reported() {
     assert_eq!(bench.guard.report().limits, Limits::empty());
 }
 
+/// Safety: 11.
 #[test]
 fn current_limit_keeps_direction_and_is_reported() {
     let mut bench = Bench::armed();
@@ -478,6 +488,7 @@ fn hard_working_motor_is_derated_below_its_limit() {
     assert!((80.0..110.0).contains(&hottest), "{hottest}");
 }
 
+/// Safety: 11, response times.
 #[test]
 fn winding_above_its_limit_is_a_fault() {
     let mut bench = Bench::armed();
@@ -493,7 +504,7 @@ fn winding_above_its_limit_is_a_fault() {
     assert_eq!(bench.guard.report().fault, Some(Fault::MotorTooHot));
 }
 
-/// Joint 2 turns by `counts_a_tick` while 1 N is wanted.
+/// Joint 2 turns by `counts_a_tick` while 1 N is commanded.
 fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
     let mut bench = Bench::armed();
     bench.target_n = Vec3::Z;
@@ -505,6 +516,7 @@ fn hurried(counts_a_tick: i32, ticks: u32) -> Bench {
     bench
 }
 
+/// Safety: 9, response times.
 #[test]
 fn speed_limit_reduces_force_and_excess_speed_is_a_fault() {
     // 28.7 µm a count: 30 counts a tick are 0.86 m/s, 52 are 1.49, 80 are 2.3.
@@ -539,7 +551,7 @@ fn host_disarm_fades_force_out_without_a_step() {
     bench.ticks(20);
     let full = bench.force_n;
     bench.guard.disarm();
-    // The wanted force no longer matters.
+    // The commanded force no longer matters.
     bench.target_n = Vec3::X * 8.0;
     let mut last = full;
     let mut ticks = 0;

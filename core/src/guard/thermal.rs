@@ -173,7 +173,8 @@ impl Motors {
         let mean = self.squares / self.ticks as f32;
         let toward = |from: Vec3, k_per_w: f32, time_s: f32| {
             let step_s = STEP_MS as f32 * 1e-3;
-            // K above the other node for A² flowing for ever; then the part of it in this update.
+            // K above the other node for A² flowing permanently; then the part of it in this
+            // update.
             let end = mean * (thermal.resistance_ohm * k_per_w);
             from + (end - from) * (step_s / time_s)
         };
@@ -264,6 +265,8 @@ mod tests {
 
     /// With any motion of a hand, no node exceeds the temperatures that are assumed without
     /// information.
+    ///
+    /// Safety: 12.
     #[test]
     fn derated_motor_never_exceeds_the_hot_start_temperatures() {
         let mut motors = Motors::new(khz(1));
@@ -300,6 +303,7 @@ mod tests {
         assert_eq!(start.housing_k, stored.housing_k);
     }
 
+    /// Safety: 12.
     #[test]
     fn reset_margin_covers_the_heat_of_the_unrecorded_time() {
         let mut motors = Motors::new(khz(1));

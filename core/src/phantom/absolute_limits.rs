@@ -1,6 +1,6 @@
 //! Absolute limits of each model and of the board, which no calibration record can raise.
 //!
-//! The guard protects what a record permits. A mistyped or hostile record could state a motor that
+//! The guard enforces the values of a record. A mistyped or hostile record could state a motor that
 //! bears 20 A or that never warms, which would disable the protection. So the numbers that protect
 //! a person's hand and the motors are limited on the dangerous side by those of the model's preset.
 //! A record may be more careful, never less. Users of stronger motors change the presets and build
@@ -27,7 +27,7 @@ const LINK_SHARE: f32 = 1.15;
 /// Valid counts per radian, as shares of the preset's. A record with more counts under-reads every
 /// angle and speed by the same factor; half of them fits another encoder.
 const COUNTS_SHARE: (f32, f32) = (0.5, 1.25);
-/// The same if the preset's ratios are a guess.
+/// The same if the preset's ratios are estimates.
 const COUNTS_SHARE_OF_A_GUESS: (f32, f32) = (0.5, 2.0);
 /// Maximum by which stops may be wider than the preset's: 5°.
 const STOPS_RAD: f32 = 5.0 * (core::f32::consts::PI / 180.0);
@@ -140,7 +140,7 @@ impl Calibration {
                 true => (CalibrationField::Ratio, Some(axis), self.ratio[axis]),
                 false => (CalibrationField::CountsPerTurn, None, self.counts_per_turn),
             };
-            // The number that would give the preset's counts, with the other number unchanged.
+            // The number that would result in the preset's counts, with the other number unchanged.
             let unit = value / (of_encoder * of_ratio);
             check(field, at, value, self.bound(min * unit, max * unit), good)?;
         }
@@ -318,6 +318,7 @@ mod tests {
         ),
     ];
 
+    /// Safety: 18, images.
     #[test]
     fn record_beyond_any_model_limit_is_refused() {
         for model in MODELS {
@@ -346,6 +347,7 @@ mod tests {
         }
     }
 
+    /// Safety: 18.
     #[test]
     fn peak_current_above_board_limit_is_refused() {
         let record = Calibration::PREMIUM_1_5;

@@ -88,11 +88,11 @@ impl CalibrationField {
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
-            Self::CountsPerTurn => "take the encoder's lines times four",
+            Self::CountsPerTurn => "use the encoder's lines times four",
             Self::Ratio => "measure with the ratio check, or count motor turns for a joint turn",
             Self::EncoderSign => "turn the joint towards larger angles: +1 if the counts rise",
             Self::MotorSign => "+1 if a positive current pushes the joint towards larger angles",
-            Self::Zero => "give the joint angles of the zero pose, inside the joint limits",
+            Self::Zero => "enter the joint angles of the zero pose, inside the joint limits",
             Self::L1 => "measure the upper link between its joint axes",
             Self::L2 => "measure the fore link from its joint axis to the tip",
             Self::MinAngle | Self::MaxAngle => {
@@ -102,18 +102,18 @@ impl CalibrationField {
                 "move the linkage to its stops; below 90°, where the links would be in line"
             }
             Self::Gravity2 | Self::Gravity3 => {
-                "fit gravity again from still poses; the motors must be able to hold it for ever"
+                "fit gravity again from still poses; the motors must hold the arm permanently"
             }
-            Self::TorqueConstant => "take it from the motor's data sheet",
+            Self::TorqueConstant => "use the motor's data sheet",
             Self::PeakCurrent | Self::ContinuousCurrent => {
-                "take it from the motor's data sheet; the continuous current is not above the peak"
+                "use the motor's data sheet; the continuous current is not above the peak"
             }
             Self::Resistance
             | Self::WindingResistance
             | Self::HousingResistance
             | Self::WindingTime
-            | Self::HousingTime => "take it from the thermal part of the motor's data sheet",
-            Self::MaxForce => "take the device's peak force",
+            | Self::HousingTime => "use the thermal part of the motor's data sheet",
+            Self::MaxForce => "use the device's peak force",
             Self::MaxSpeed => "a hand needs about 1000 mm/s",
         }
     }
@@ -305,6 +305,7 @@ mod tests {
     /// A record with one fault, and the expected message.
     type Case = (fn(&mut Calibration), CalibrationField, Option<u8>);
 
+    /// Safety: 17.
     #[test]
     fn error_names_each_wrong_number() {
         let cases: [Case; 24] = [

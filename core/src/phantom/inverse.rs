@@ -9,7 +9,7 @@
 //!
 //! # Near singular poses
 //!
-//! On the base's axis (r = 0) every q1 gives the same tip; the result is one of them. With the
+//! On the base's axis (r = 0) every q1 has the same tip; the result is one of them. With the
 //! links nearly in line, the joint angles change as the square root of the tip's distance; the
 //! *tip* of the result is still within 1 µm of the requested one (tested by a sweep).
 

@@ -33,7 +33,7 @@ fn inverse_kinematics_round_trips_within_a_micrometre() {
                         continue;
                     }
                     let at = tip(&record, q);
-                    let found = record.joints_at(at).expect("it came from a pose");
+                    let found = record.joints_at(at).expect("it is from a pose");
                     assert!(limits.contains(found, 1e-5), "{q} {found}");
                     worst = worst.max((tip(&record, found) - at).length());
                     same += u32::from((found - q).abs().max_element() < 1e-3);
@@ -52,7 +52,7 @@ fn inverse_kinematics_round_trips_within_a_micrometre() {
 }
 
 #[test]
-fn inverse_kinematics_takes_the_branch_inside_limits() {
+fn inverse_kinematics_uses_the_branch_inside_limits() {
     let record = Calibration::PREMIUM_1_5;
     // Leaning over backwards, turned by 80°: turning towards the tip would need −100°.
     let q = Vec3::new(80f32.to_radians(), 115f32.to_radians(), 169f32.to_radians());

@@ -70,7 +70,7 @@ impl Pose {
         )
     }
 
-    /// Returns the joint torques in Nm that give `force_n` (device frame) at the tip: τ = Jᵀ·F.
+    /// Returns the joint torques in Nm that produce `force_n` (device frame) at the tip: τ = Jᵀ·F.
     ///
     /// Bounded in every pose, including singular ones: |τ1| ≤ (l1 + l2)·|F|, |τ2| ≤ l1·|F|, |τ3| ≤
     /// l2·|F|, because each column of J is a joint's lever and no lever is longer (tested by a

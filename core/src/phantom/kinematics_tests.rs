@@ -88,6 +88,7 @@ fn directions() -> impl Iterator<Item = Vec3> {
     })
 }
 
+/// Safety: 10.
 #[test]
 fn torques_stay_within_levers_even_in_singular_poses() {
     let (l1, l2) = (PREMIUM.l1_mm * 1e-3, PREMIUM.l2_mm * 1e-3);

@@ -120,7 +120,7 @@ impl Calibration {
     };
 
     /// Phantom Omni (Touch): 133.35 mm links, 3.3 N, 0.055 mm a count. Uncertain: the ratios, which
-    /// follow from that, and stops and motors, which are cautious guesses. Gravity must be
+    /// follow from that, and stops and motors, which are cautious estimates. Gravity must be
     /// measured.
     pub const OMNI: Self = Self {
         model: Model::Omni,
@@ -147,6 +147,8 @@ mod tests {
     use super::*;
 
     /// Checks the tables here and in docs/reference/hardware.md.
+    ///
+    /// Safety: images.
     #[test]
     fn premium_1_0_resolution_matches_tables_for_both_ratios() {
         let counts_a_mm = |ratio: Vec3| {

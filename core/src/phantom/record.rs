@@ -103,6 +103,7 @@ mod tests {
         assert_eq!(Calibration::decode(&bytes), Ok(Calibration::PREMIUM_1_5));
     }
 
+    /// Safety: 17.
     #[test]
     fn record_with_flipped_bit_or_missing_byte_is_rejected() {
         let good = bytes();

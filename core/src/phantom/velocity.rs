@@ -63,7 +63,7 @@ impl Readings {
         self.before = (self.before + 1).min(WINDOW);
     }
 
-    /// Forgets all readings but this one.
+    /// Clears all readings except this one.
     pub fn restart(&mut self, counts: [i32; 3]) {
         self.push(counts);
         self.before = 0;

@@ -52,8 +52,8 @@ impl CoarseTile {
         }
     }
 
-    /// Returns the coarse cell that holds a sample of the scene's level, and the sample's place in
-    /// it, eastward and northward from 0 to 1; `None` beyond the tile.
+    /// Returns the coarse cell that contains a sample of the scene's level, and the sample's place
+    /// in it, eastward and northward from 0 to 1; `None` beyond the tile.
     #[inline(never)]
     fn place(&self, sample: Cell) -> Option<([usize; 2], [f32; 2])> {
         let span = (TILE_CELLS as i32) << self.shift;

@@ -36,7 +36,7 @@ impl TileIndex {
         Self { col, row }
     }
 
-    /// Returns the index of the tile that holds the patch over `cell`.
+    /// Returns the index of the tile that contains the patch over `cell`.
     #[must_use]
     #[inline]
     pub const fn containing(cell: Cell) -> Self {
@@ -94,7 +94,7 @@ impl TileKey {
         }
     }
 
-    /// Returns the key of the tile of `level` that holds the patch over `cell`.
+    /// Returns the key of the tile of `level` that contains the patch over `cell`.
     #[must_use]
     pub const fn containing(level: u8, cell: Cell) -> Self {
         Self {

@@ -4,8 +4,8 @@ use super::index::{TILE_SHIFT, wrap};
 
 /// Maxima over 2ᵏ × 2ᵏ tiles of a torus of `D` × `D`, in whole cells.
 ///
-/// Level 0 is a tile. A node of a higher level is known only while all tiles under it are stored;
-/// unknown nodes read as `i32::MAX`, tiles outside the field as `i32::MIN`.
+/// Level 0 is a tile. A node of a higher level is valid only while all tiles under it are stored;
+/// invalid nodes read as `i32::MAX`, tiles outside the field as `i32::MIN`.
 ///
 /// The first plane is level 0; the second has levels 1 and up, one after the other, in (D² − 1)/3
 /// of its entries.

@@ -6,7 +6,7 @@ use super::tile::{MAX_STEP_CELLS, Tile};
 use super::window::Window;
 use crate::grid::MAX_CELL;
 
-/// Memory of a window of `D × D` tiles, 5.5 kB each; it can hold a whole field.
+/// Memory of a window of `D × D` tiles, 5.5 kB each; it can contain a whole field.
 ///
 /// Without an allocator it is stored wherever its owner puts it. On a desktop, put large ones on
 /// the heap: `Box::new(TileArena::<16>::new())`, then [`Self::fill`].
@@ -35,7 +35,7 @@ pub struct TileArena<const D: usize> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FieldError {
     /// No cells, or more than fit.
-    #[error("a field of {} × {} cells; this storage holds from 1 × 1 to {max} × {max}", size.columns, size.rows)]
+    #[error("a field of {} × {} cells; this storage accepts 1 × 1 to {max} × {max}", size.columns, size.rows)]
     Size {
         /// The field's size.
         size: FieldSize,
@@ -43,7 +43,7 @@ pub enum FieldError {
         max: i32,
     },
     /// The number of heights is wrong: a field of the size has this many.
-    #[error("a field of this size has {0} heights: one more than cells each way")]
+    #[error("a field of this size has {0} heights: one more than cells in each direction")]
     Count(i32),
     /// The heights are too steep.
     #[error(
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!((few, many), (FieldError::Count(9), FieldError::Count(9)));
         assert_eq!(
             format!("{few}"),
-            "a field of this size has 9 heights: one more than cells each way"
+            "a field of this size has 9 heights: one more than cells in each direction"
         );
     }
 

@@ -227,7 +227,7 @@ impl<const D: usize> TileRequester<D> {
         } else {
             0.0
         };
-        // The casts saturate, so any velocity gives a valid cell.
+        // The casts saturate, so any velocity results in a valid cell.
         let after = |from: Cell, ticks: f32| {
             let [east, north] = hint.velocity.map(|v| (v * ticks) as i32);
             from.offset(east, north)
@@ -352,7 +352,7 @@ mod tests {
             Some(key)
         );
         requester.received(key);
-        // Another fallback with the same keys is requested anew.
+        // Another fallback with the same keys is requested again.
         requester.set_fallback(Some(fallback));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(key));
         assert_eq!(requester.next_request(0, &at(400, 48)), Some(near));
@@ -369,7 +369,7 @@ mod tests {
                 requester.set_fallback(Some(fallback(None)));
                 requester.received(fallback(None).wide.key(0));
             }
-            // Answers take 60 ticks each.
+            // Answers arrive after 60 ticks.
             for (tick, col) in (0..40_u32).map(|n| (n * 61, n as i32 % 8)) {
                 let here = at(col * 32 + 16, 48);
                 for (col, row) in drain(&mut requester, tick, &here) {

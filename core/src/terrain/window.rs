@@ -2,12 +2,12 @@
 
 mod late_tiles;
 
+use super::blend_allowances::BlendAllowances;
 use super::extent::{CellBox, FieldSize};
 use super::fallback::FallbackSlots;
 use super::index::{BLOCK_SHIFT, TILE_SHIFT, TileIndex, TileKey, wrap};
 use super::max_pyramid::MaxPyramid;
 use super::tile::Tile;
-use super::tile_blend::TileBlend;
 use crate::grid::{Altitude, Cell};
 
 /// Content of a cell.
@@ -62,7 +62,7 @@ impl Corners {
 /// let cell = Cell::new(7_000, 3_000);
 /// assert_eq!(window.ground(cell), CellContent::Missing);
 ///
-/// // A tile comes in, and a buffer for the next one goes out.
+/// // A tile is installed, and a buffer for the next one is returned.
 /// let mut spare = Tile::VACANT;
 /// let key = TileKey::containing(0, cell);
 /// spare.fill_from(key, 0, size, |_x, _y| 1.5).expect("base 0 is in range");
@@ -87,7 +87,7 @@ pub struct Window<'t, const D: usize> {
     pub(super) slots: [[&'t mut Tile; D]; D],
     pyramid: MaxPyramid<D>,
     pub(super) fallback: FallbackSlots<'t>,
-    pub(super) tile_blend: TileBlend<D>,
+    pub(super) allowances: BlendAllowances<D>,
     /// The fallback of the next scene, and its level; it is not rendered.
     next: FallbackSlots<'t>,
     next_level: u8,
@@ -114,7 +114,7 @@ impl<'t, const D: usize> Window<'t, D> {
             fallback: FallbackSlots::EMPTY,
             next: FallbackSlots::EMPTY,
             next_level: 0,
-            tile_blend: TileBlend::NONE,
+            allowances: BlendAllowances::NONE,
         };
         for key in size.tiles() {
             window.slots[wrap::<D>(key.row)][wrap::<D>(key.col)].mark_as_surface();
@@ -234,17 +234,17 @@ impl<'t, const D: usize> Window<'t, D> {
         })
     }
 
-    /// Returns true if everything in the box is known to lie below `low`.
+    /// Returns true if everything in the box is certainly below `low`.
     ///
-    /// `false` may also mean "cannot tell cheaply". Compares one number for the whole field, then
-    /// at most four nodes.
+    /// `false` may also mean that the cheap test is not conclusive. Compares one number for the
+    /// whole field, then at most four nodes.
     #[must_use]
     #[inline]
     pub fn is_clear(&self, span: CellBox, low: Altitude) -> bool {
         low.cell() >= self.top || self.box_is_clear(span.clipped(self.size), low)
     }
 
-    /// Returns true if all samples around a box of at most 2 × 2 patches are known to lie below
+    /// Returns true if all samples around a box of at most 2 × 2 patches are certainly below
     /// `low`, by a comparison of the nine samples themselves.
     ///
     /// `false` also if the box is larger, or not inside one stored tile.
@@ -305,7 +305,7 @@ impl<'t, const D: usize> Window<'t, D> {
             .surface_tile(TileIndex::new(col << level, row << level))
             .is_some()
         {
-            // A node is known only while all its tiles are stored, so its south-west tile
+            // A node is valid only while all its tiles are stored, so its south-west tile
             // identifies the node that the slot describes.
             self.pyramid.node(level, col, row)
         } else {
@@ -474,7 +474,11 @@ mod tests {
         assert_eq!(field.window.occupant(old), Some(new));
         let foreign = TileKey { level: 3, ..old };
         assert_eq!(field.install(foreign).key(), Some(foreign), "refused");
-        assert_eq!(field.install(new).key(), None, "held before and after");
+        assert_eq!(
+            field.install(new).key(),
+            None,
+            "the tile is stored before and after"
+        );
         assert_eq!(field.window.occupant(old), Some(new));
         let outside = TileKey::new(0, 20, old.index.row);
         assert_eq!(field.install(outside).key(), Some(outside), "refused");

@@ -3,13 +3,11 @@
 #[path = "in_contact_cancelled.rs"]
 mod cancelled;
 
+use super::pressed_arm::{DEEP, PressedArm};
 use super::*;
 use crate::clutch::ClutchMode;
 use crate::contact::Friction;
 use crate::scene::{ContactMap, SceneChange};
-
-/// Counts of the axes for a tip some 5 mm deep in the ground.
-const DEEP: i32 = -170;
 
 /// Slopes of all directions, up to 20 degrees, with detail of 3 cells.
 fn ground(x: i32, y: i32) -> f32 {
@@ -41,62 +39,15 @@ fn fallback(size: i32) -> Fallback {
     }
 }
 
-/// An armed arm that presses into the ground.
-struct Pressing<'t> {
-    device: Device<'t, 4>,
-    last: Outcome,
-    counts: [i32; 3],
-    /// Tremor of the hand: its power of two, in counts.
-    tremor: u32,
+/// An arm of a hand with a tremor.
+fn pressed(tiles: &mut [Tile], height: fn(i32, i32) -> f32) -> PressedArm<'_> {
+    PressedArm {
+        tremor: 1,
+        ..PressedArm::new(tiles, height, GENTLE_N)
+    }
 }
 
-impl<'t> Pressing<'t> {
-    fn new(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
-        let mut device = Device::<4>::armed(tiles, height);
-        let path = (0..=420).chain((DEEP..420).rev());
-        let last = path.map(|n| device.tick([0, n, 0])).last();
-        Self {
-            device,
-            last: last.expect("ticks"),
-            counts: [0, DEEP, 0],
-            tremor: 1,
-        }
-    }
-
-    /// Runs a tick, and returns the change of the force in it, N.
-    fn tick(&mut self) -> f32 {
-        // An arm without any motion is a fault.
-        let random = self.last.sample.tick.wrapping_mul(0x9E37_79B9);
-        let tremor = (random >> (32 - self.tremor)) as i32;
-        let counts = self.counts.map(|count| count >> self.tremor << self.tremor);
-        self.counts = counts.map(|count| count | tremor);
-        let now = self.device.tick(self.counts);
-        assert_eq!((now.sample.mode, now.sample.fault), (Mode::Armed, None));
-        let change = (now.sample.force_n - self.last.sample.force_n).length();
-        self.last = now;
-        change
-    }
-
-    /// Sends a change under the hand, whose tiles will be served.
-    fn change(&mut self, change: SceneChange, height: fn(i32, i32) -> f32) {
-        let scene = change.scene;
-        self.device.size = scene.size;
-        self.device.height = height;
-        self.device.fallback = scene.fallback.map(|fallback| (fallback, scene.level));
-        if !change.keeps_tiles {
-            self.device.requester.reset(scene.level, scene.size);
-        }
-        self.device.requester.set_fallback(scene.fallback);
-        self.device.requester.clear_pending();
-        self.send(Command::SceneChange(change));
-    }
-
-    /// Sends a command, and takes the buffers that have become free.
-    fn send(&mut self, command: Command<'t>) {
-        let free = self.device.haptics.accept(command).expect("valid");
-        self.device.spare.extend(free);
-    }
-
+impl PressedArm<'_> {
     /// Returns the change to a field with cells of 2^-`finer` of the present ones, of the same size
     /// in the hand: a zoom by 2^`finer`.
     fn zoom(&self, number: u8, level: u8, finer: i32) -> SceneChange {
@@ -133,7 +84,7 @@ const GENTLE_N: f32 = 0.2;
 fn zoom_under_a_pressing_hand_keeps_the_force() {
     for (zoom, height) in [(-1, coarser as fn(i32, i32) -> f32), (1, finer)] {
         let mut tiles = buffers::<4>();
-        let mut arm = Pressing::new(&mut tiles, ground);
+        let mut arm = pressed(&mut tiles, ground);
         let before = arm.last.sample;
         let force_n = before.force_n.length();
         assert!(
@@ -143,10 +94,9 @@ fn zoom_under_a_pressing_hand_keeps_the_force() {
         let level = if zoom < 0 { 1 } else { 0 };
         let change = arm.zoom(1, level, zoom);
         arm.change(change, height);
-        let (mut min, mut max_step) = (force_n, 0.0_f32);
+        let mut min = force_n;
         for tick in 0..600 {
-            max_step = max_step.max(arm.tick());
-            let sample = arm.last.sample;
+            let sample = arm.tick();
             min = min.min(sample.force_n.length());
             assert_eq!(sample.view, u8::from(tick > 0), "tick {tick}");
             assert!(
@@ -155,7 +105,6 @@ fn zoom_under_a_pressing_hand_keeps_the_force() {
                     .intersects(Limits::CLUTCH_OPEN | Limits::TERRAIN_MISSING)
             );
         }
-        assert!(max_step <= GENTLE_N, "zoom {zoom}: {max_step} N in a tick");
         assert!(min > 0.5 * force_n, "zoom {zoom}: {min} of {force_n} N");
         let after = arm.last.sample;
         assert_eq!(after.limits, Limits::empty(), "on the new tiles");
@@ -167,15 +116,9 @@ fn zoom_under_a_pressing_hand_keeps_the_force() {
 }
 
 /// Runs ticks in which the placement does not change.
-fn stays(arm: &mut Pressing<'_>, view: u8, ticks: usize) {
-    for tick in 0..ticks {
-        let change = arm.tick();
-        let sample = &arm.last.sample;
-        assert!(
-            change <= GENTLE_N,
-            "{tick}: {change} N in a tick: {sample:?}"
-        );
-        assert_eq!(sample.view, view);
+fn stays(arm: &mut PressedArm<'_>, view: u8, ticks: usize) {
+    for _ in 0..ticks {
+        assert_eq!(arm.tick().view, view);
     }
 }
 
@@ -186,8 +129,8 @@ fn eight_levels_out_and_in_keep_the_force() {
         (5.5 + 0.2 * (x * 0.7).sin() * (y * 0.6).cos()) as f32
     }
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane_and_detail);
-    let (mut min, mut max) = (f32::MAX, 0.0_f32);
+    let mut arm = pressed(&mut tiles, plane_and_detail);
+    let mut min = f32::MAX;
     for (number, level) in (1..=8)
         .chain((0..8).rev())
         .enumerate()
@@ -198,19 +141,18 @@ fn eight_levels_out_and_in_keep_the_force() {
         change.scene.top = 7;
         arm.change(change, plane_and_detail);
         for _ in 0..300 {
-            max = max.max(arm.tick());
-            min = min.min(arm.last.sample.force_n.length());
+            min = min.min(arm.tick().force_n.length());
         }
         assert_eq!(arm.last.sample.view, number);
         assert_eq!(arm.last.sample.limits, Limits::empty());
     }
-    assert!(max <= GENTLE_N && min > 1.0, "{max} N in a tick, {min} N");
+    assert!(min > 1.0, "{min} N");
 }
 
 #[test]
 fn change_waits_for_its_terrain_and_the_press() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, ground);
+    let mut arm = pressed(&mut tiles, ground);
     let change = arm.zoom(1, 0, 1);
     // Its tiles do not come: the requester does not know of them.
     arm.device.send(Command::SceneChange(change));
@@ -228,35 +170,23 @@ fn change_waits_for_its_terrain_and_the_press() {
         .expect("taken");
     arm.device.spare.push(back.expect("refused"));
     // The hand lifts, and the terrain arrives.
-    arm.counts = [0, 420, 0];
-    for n in DEEP..=420 {
-        arm.counts = [0, n, 0];
-        arm.last = arm.device.tick(arm.counts);
-    }
-    assert_eq!(arm.last.sample.state, ContactState::Free);
+    assert_eq!(arm.move_to([0, 420, 0], 590).state, ContactState::Free);
     arm.change(change, finer);
-    for _ in 0..20 {
-        arm.last = arm.device.tick(arm.counts);
-        assert_eq!(arm.last.sample.view, 0, "nothing presses");
-    }
+    // Nothing presses.
+    stays(&mut arm, 0, 20);
     // The clutch opens, and the change is made as always.
     arm.device.send(Command::Clutch(ClutchMode::InPlace));
-    for _ in 0..150 {
-        arm.last = arm.device.tick(arm.counts);
-    }
-    assert_eq!(arm.last.sample.view, 1);
-    assert!(arm.last.sample.limits.contains(Limits::CLUTCH_OPEN));
+    let open = arm.ticks(150);
+    assert_eq!(open.view, 1);
+    assert!(open.limits.contains(Limits::CLUTCH_OPEN));
     arm.device.send(Command::Clutch(ClutchMode::Released));
-    for _ in 0..520 {
-        arm.last = arm.device.tick(arm.counts);
-    }
-    assert_eq!(arm.last.sample.limits, Limits::empty());
+    assert_eq!(arm.ticks(520).limits, Limits::empty());
 }
 
 #[test]
 fn change_without_heights_under_the_hand_is_not_made() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, ground);
+    let mut arm = pressed(&mut tiles, ground);
     let change = arm.zoom(1, 0, 1);
     arm.change(change, |_, _| f32::NAN);
     stays(&mut arm, 0, 100);
@@ -267,7 +197,7 @@ fn change_without_heights_under_the_hand_is_not_made() {
 #[test]
 fn buffers_return_after_changes() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, ground);
+    let mut arm = pressed(&mut tiles, ground);
     let spare = arm.device.spare.len();
     for number in 1..=20 {
         arm.change(arm.zoom(number, 0, 0), ground);
@@ -309,7 +239,7 @@ fn buffers_return_after_changes() {
 fn stiffness_changes_the_force_gradually_and_not_the_depth() {
     for times in [2.0, 0.5] {
         let mut tiles = buffers::<4>();
-        let mut arm = Pressing::new(&mut tiles, plane);
+        let mut arm = pressed(&mut tiles, plane);
         let before = arm.last.sample;
         let mut change = arm.zoom(1, 0, 0);
         change.scene.params.stiffness_n_per_mm *= times;
@@ -339,7 +269,7 @@ fn rough(x: i32, y: i32) -> f32 {
 fn late_tiles_after_a_change_keep_the_force() {
     for (late_ticks, rise) in [(50, 3.0), (1_000, 3.0), (300, 0.3), (300, -0.3)] {
         let mut tiles = buffers::<4>();
-        let mut arm = Pressing::new(&mut tiles, rough);
+        let mut arm = pressed(&mut tiles, rough);
         arm.tremor = 2;
         arm.device.fallback_rise = rise;
         for number in 1..=6 {
@@ -348,11 +278,11 @@ fn late_tiles_after_a_change_keep_the_force() {
             arm.change(arm.zoom(number, 0, 0), |x, y| rough(x + 1, y + 2));
             for tick in 0..late_ticks + 700 {
                 arm.device.is_slow = tick < late_ticks;
-                let change = arm.tick();
-                let force_n = arm.last.sample.force_n.length();
-                let at = std::format!("{rise}, {number}, {tick}: {force_n} of {before} N");
-                assert!(change <= GENTLE_N, "{at}: {change} N in a tick");
-                assert!((force_n / before - 1.0).abs() < 0.1, "{at}");
+                let force_n = arm.tick().force_n.length();
+                assert!(
+                    (force_n / before - 1.0).abs() < 0.1,
+                    "{rise}, {number}, {tick}: {force_n} of {before} N"
+                );
             }
             assert_eq!(arm.last.sample.view, number);
             assert_eq!(arm.last.sample.limits, Limits::empty());
@@ -367,13 +297,12 @@ fn change_on_a_slope_keeps_the_force() {
         5.5 + 1.732 * (x - 320) as f32
     }
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, slope);
+    let mut arm = pressed(&mut tiles, slope);
     arm.device.fallback_rise = 3.0;
     let before = arm.last.sample.force_n.length();
     arm.change(arm.zoom(1, 0, 0), slope);
     for tick in 0..500 {
-        assert!(arm.tick() <= GENTLE_N);
-        let force_n = arm.last.sample.force_n.length();
+        let force_n = arm.tick().force_n.length();
         assert!(
             (force_n / before - 1.0).abs() < 0.05,
             "{tick}: {force_n} of {before} N"
@@ -393,7 +322,7 @@ fn change_to_an_opposite_slope_is_not_made() {
         5.5 - 1.732 * (x - 320) as f32
     }
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, slope);
+    let mut arm = pressed(&mut tiles, slope);
     let mut change = arm.zoom(1, 0, 0);
     let map = change.in_contact.as_mut().expect("a map");
     let at = map.to.relative_to([0; 3]);
@@ -407,7 +336,7 @@ fn change_to_an_opposite_slope_is_not_made() {
 #[test]
 fn force_turns_on_a_soft_surface_in_half_a_second() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let mut change = arm.zoom(1, 0, 0);
     change.scene.params.stiffness_n_per_mm *= 0.11;
     arm.change(change, plane);
@@ -422,7 +351,7 @@ fn force_turns_on_a_soft_surface_in_half_a_second() {
 #[test]
 fn old_force_does_not_return() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     arm.change(arm.zoom(1, 0, 0), plane);
     stays(&mut arm, 0, 1);
     stays(&mut arm, 1, 60);
@@ -432,12 +361,8 @@ fn old_force_does_not_return() {
     }
     arm.send(Command::Clutch(ClutchMode::InPlace));
     for _ in 0..150 {
-        arm.tick();
-        assert!(
-            arm.last.sample.force_n.length() < 0.4,
-            "{:?}",
-            arm.last.sample
-        );
+        let sample = arm.tick();
+        assert!(sample.force_n.length() < 0.4, "{sample:?}");
     }
 }
 
@@ -446,7 +371,7 @@ fn old_force_does_not_return() {
 #[test]
 fn change_at_the_limit_or_on_the_fallback_is_not_made() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let mut change = arm.zoom(1, 0, 0);
     change.scene.params.max_force_n = 4.0;
     arm.device.fallback_rise = 4.0;
@@ -454,7 +379,7 @@ fn change_at_the_limit_or_on_the_fallback_is_not_made() {
     stays(&mut arm, 0, 100);
 
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     arm.change(arm.zoom(1, 0, 0), plane);
     stays(&mut arm, 0, 1);
     stays(&mut arm, 1, 60);
@@ -475,7 +400,7 @@ fn slide_before_a_pan_keeps_the_force() {
         5.5 + (x - 320) as f32
     }
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let change = arm.zoom(1, 0, 0);
     arm.device.send(Command::SceneChange(change));
     let began = arm.last.sample.proxy;
@@ -488,8 +413,7 @@ fn slide_before_a_pan_keeps_the_force() {
     let before = arm.last.sample.force_n.length();
     arm.change(change, slope);
     for tick in 0..300 {
-        arm.tick();
-        let force_n = arm.last.sample.force_n.length();
+        let force_n = arm.tick().force_n.length();
         // The proxy slides down the slope, until the force is along its normal.
         let ratio = force_n / before;
         assert!(
@@ -505,7 +429,7 @@ fn slide_before_a_pan_keeps_the_force() {
 #[test]
 fn late_tile_holds_no_force_sideways() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     dragged(&mut arm);
     arm.device.is_slow = true;
     let mut change = arm.zoom(2, 0, 1);
@@ -521,7 +445,7 @@ fn late_tile_holds_no_force_sideways() {
 #[test]
 fn disarming_ends_the_turn_of_the_force() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     arm.device.fallback_rise = 2.0;
     arm.device.is_slow = true;
     arm.change(arm.zoom(1, 0, 0), plane);
@@ -536,7 +460,7 @@ fn disarming_ends_the_turn_of_the_force() {
 }
 
 /// Drags the hand over rubber, by 9 mm, with placement number 1.
-fn dragged(arm: &mut Pressing<'_>) {
+fn dragged(arm: &mut PressedArm<'_>) {
     let mut rubber = arm.zoom(1, 0, 0);
     rubber.scene.params.friction = Friction::coulomb(2.0);
     rubber.scene.fallback = None;
@@ -553,7 +477,7 @@ fn dragged(arm: &mut Pressing<'_>) {
 #[test]
 fn friction_keeps_its_force_in_a_change() {
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     dragged(&mut arm);
     let before = arm.last.sample.force_n;
     assert!(before.truncate().length() > before.z, "{before}");
@@ -571,7 +495,7 @@ fn friction_keeps_its_force_in_a_change() {
 fn change_that_would_drop_or_raise_the_force_is_not_made() {
     for times in [0.05, 2.0] {
         let mut tiles = buffers::<4>();
-        let mut arm = Pressing::new(&mut tiles, plane);
+        let mut arm = pressed(&mut tiles, plane);
         let mut change = arm.zoom(1, 0, 0);
         change.scene.params.stiffness_n_per_mm *= times;
         arm.change(change, plane);
@@ -585,14 +509,12 @@ fn change_in_the_air_keeps_the_height_over_the_ground() {
         (5.5 + 0.3 * f64::from(x - 320) + 0.1 * f64::from(y - 320)) as f32
     }
     let mut tiles = buffers::<4>();
-    let mut arm = Pressing::new(&mut tiles, hill);
+    let mut arm = pressed(&mut tiles, hill);
     let change = arm.zoom(1, 0, 1);
     arm.device.send(Command::SceneChange(change));
     // The hand lifts before the terrain has arrived, and moves away.
-    for n in DEEP..=420 {
-        arm.last = arm.device.tick([n - DEEP, n, 0]);
-    }
-    arm.counts = [420 - DEEP, 420, 0];
+    arm.tremor = 0;
+    arm.move_to([590, 420, 0], 590);
     let above_mm = |sample: &TickRecord, scale: f32| {
         let at = sample.hip.relative_to([0; 3]);
         let ground = 5.5 * scale + 0.3 * (at.x - 320.0 * scale) + 0.1 * (at.y - 320.0 * scale);
@@ -600,10 +522,7 @@ fn change_in_the_air_keeps_the_height_over_the_ground() {
     };
     let before = above_mm(&arm.last.sample, 1.0);
     arm.device.send(Command::Clutch(ClutchMode::InPlace));
-    for _ in 0..150 {
-        arm.last = arm.device.tick(arm.counts);
-    }
-    assert_eq!(arm.last.sample.view, 1);
+    assert_eq!(arm.ticks(150).view, 1);
     let after = above_mm(&arm.last.sample, 2.0);
     assert!(
         before > 5.0 && (after - before).abs() < 0.01,
@@ -628,7 +547,7 @@ fn random_changes_make_no_step_and_lose_no_buffer() {
         }
     }];
     let mut tiles = std::vec![Tile::VACANT; 16 + 5];
-    let mut arm = Pressing::new(&mut tiles, ground);
+    let mut arm = pressed(&mut tiles, ground);
     let (all, state) = (arm.device.spare.len(), &mut 7);
     let mut counts = [0, 0];
     for n in 0..cases(400, 40) {
@@ -655,10 +574,9 @@ fn random_changes_make_no_step_and_lose_no_buffer() {
         arm.change(change, height);
         let clutch = random(state);
         for tick in 0..200 {
-            let to = 60.0 * (0.02 * (n * 200 + tick) as f32).sin() + DEEP as f32 * random(state);
+            let to = 60.0 * (0.02 * (n * 200 + tick) as f32).sin() + DEEP[1] as f32 * random(state);
             arm.counts[1] += (to as i32 - arm.counts[1]).clamp(-2, 2);
-            arm.tick();
-            let sample = &arm.last.sample;
+            let sample = arm.tick();
             // The guard would hide a step of the force.
             let is_limited = sample.limits.contains(Limits::SLEW_LIMITED);
             assert!(!is_limited, "change {n}, tick {tick}: {sample:?}");

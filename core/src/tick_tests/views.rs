@@ -1,7 +1,8 @@
 //! The clutch, and changes of the placement while it is open.
 
+use super::pressed_arm::{DEEP, PressedArm};
 use super::*;
-use crate::clutch::ClutchMode::{self, InPlace, Released, WithHand};
+use crate::clutch::ClutchMode::{InPlace, Released, WithHand};
 use crate::guard::MAX_SLEW_N_PER_S;
 use crate::scene::SceneChange;
 
@@ -10,71 +11,13 @@ const SLEW_N: f32 = MAX_SLEW_N_PER_S / 1000.0;
 /// Maximum change of the force in a tick while the clutch moves and the arm stands still: 8.5 N in
 /// 0.1 s, plus rounding.
 const GENTLE_N: f32 = 0.0851;
-/// Counts of the axes for a tip some 5 mm deep in the plane.
-const DEEP: [i32; 3] = [0, -170, 0];
-
-/// A monitor of every tick: the arm stays armed, and the force makes no step.
-struct MonitoredArm<'t> {
-    device: Device<'t, 4>,
-    last: Outcome,
-    counts: [i32; 3],
-    max_n: f32,
+fn pressed(tiles: &mut [Tile], height: fn(i32, i32) -> f32) -> PressedArm<'_> {
+    PressedArm::new(tiles, height, GENTLE_N)
 }
 
-impl<'t> MonitoredArm<'t> {
-    /// An armed arm, pressed into the ground.
-    fn pressed(tiles: &'t mut [Tile], height: fn(i32, i32) -> f32) -> Self {
-        let mut device = Device::<4>::armed(tiles, height);
-        let deeper = (0..-DEEP[1]).map(|n| [0, -n, 0]);
-        let path = (0..=420).map(|n| [0, n, 0]);
-        let back = (0..=420).map(|n| [0, 420 - n, 0]);
-        let last = path
-            .chain(back)
-            .chain(deeper)
-            .map(|c| device.tick(c))
-            .last();
-        Self {
-            device,
-            last: last.expect("ticks"),
-            counts: DEEP,
-            max_n: GENTLE_N,
-        }
-    }
-
-    fn tick(&mut self) -> TickRecord {
-        let now = self.device.tick(self.counts);
-        assert_eq!(now.sample.mode, Mode::Armed);
-        assert!(now.drive.enabled, "the arm stays armed");
-        assert_eq!(now.sample.fault, None);
-        let change = (now.sample.force_n - self.last.sample.force_n).length();
-        assert!(change <= self.max_n, "{change} N in a tick");
-        self.last = now;
-        now.sample
-    }
-
-    fn ticks(&mut self, count: usize) -> TickRecord {
-        (0..count).fold(self.last.sample, |_, _| self.tick())
-    }
-
-    fn clutch(&mut self, hold: ClutchMode) {
-        self.device.send(Command::Clutch(hold));
-    }
-
-    /// Applies a new placement, with these heights.
-    fn put(&mut self, view: SceneChange, height: fn(i32, i32) -> f32) {
-        let scene = view.scene;
-        self.device.height = height;
-        self.device.size = scene.size;
-        if !view.keeps_tiles {
-            self.device.requester.reset(scene.level, scene.size);
-        }
-        self.device.send(Command::SceneChange(view));
-    }
-
-    fn depth_mm(&self, cell_mm: f32) -> f32 {
-        let sample = &self.last.sample;
-        sample.hip.to(&sample.proxy).length() * cell_mm
-    }
+/// Returns the depth, cells of 1 mm.
+fn depth_mm(sample: &TickRecord) -> f32 {
+    sample.hip.to(&sample.proxy).length()
 }
 
 fn gentle(x: i32, y: i32) -> f32 {
@@ -112,10 +55,10 @@ fn halved(point: GridPoint) -> GridPoint {
 #[test]
 fn held_clutch_has_no_force_and_shifts_the_terrain() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let rendered = arm.tick();
     assert!(rendered.force_n.z > 2.0, "{}", rendered.force_n);
-    arm.clutch(WithHand);
+    arm.device.send(Command::Clutch(WithHand));
     let opening = arm.ticks(99);
     assert!(opening.limits.contains(Limits::CLUTCH_MOVES));
     assert!(opening.force_n.z > 0.0);
@@ -127,9 +70,9 @@ fn held_clutch_has_no_force_and_shifts_the_terrain() {
         arm.counts = [n, DEEP[1] + 2 * n, -n];
         assert!(arm.tick().hip.is_same(&open.hip));
     }
-    let home = |arm: &MonitoredArm<'_>| arm.device.haptics.scene.expect("a scene").home;
+    let home = |arm: &PressedArm<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!(open.hip.to(&back.hip).length() < 1e-4, "{:?}", back.hip);
@@ -142,33 +85,24 @@ fn held_clutch_has_no_force_and_shifts_the_terrain() {
     assert!(arm.tick().hip.to(&open.hip).z < -1.0);
 }
 
-/// Moves the arm there, with `counts` in each tick.
-fn move_to(arm: &mut MonitoredArm<'_>, counts: [i32; 3], ticks: i32) -> TickRecord {
-    let from = arm.counts;
-    for n in 1..=ticks {
-        arm.counts = [0, 1, 2].map(|axis| from[axis] + (counts[axis] - from[axis]) * n / ticks);
-        arm.tick();
-    }
-    arm.last.sample
-}
-
+/// Safety: 15.
 #[test]
 fn terrain_stays_while_held_for_another_placement() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let rendered = arm.tick();
-    arm.clutch(InPlace);
+    arm.device.send(Command::Clutch(InPlace));
     let open = arm.ticks(105);
     // The hand yields by some 2 mm, and then moves 3 mm to the side.
-    move_to(&mut arm, [60, DEEP[1] - 70, 0], 100);
+    arm.move_to([60, DEEP[1] - 70, 0], 100);
     assert!(arm.last.sample.hip.is_same(&open.hip));
     // The same ground, twice as large.
     let mut change = view(1, 0, open.hip);
     change.scene.cell_mm = 2.0;
     change.keeps_tiles = true;
-    arm.put(change, plane);
+    arm.change(change, plane);
     arm.ticks(20);
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     let deeper = arm.ticks(510);
     assert_eq!(deeper.limits, Limits::empty());
     assert!(
@@ -177,7 +111,7 @@ fn terrain_stays_while_held_for_another_placement() {
         deeper.force_n
     );
     // The arm is pushed back to its earlier place.
-    let back = move_to(&mut arm, DEEP, 300);
+    let back = arm.move_to(DEEP, 300);
     let change = back.force_n - rendered.force_n;
     assert!(
         change.length() < 2e-3,
@@ -187,17 +121,18 @@ fn terrain_stays_while_held_for_another_placement() {
     );
 }
 
+/// Safety: 15.
 #[test]
 fn far_hand_motion_shifts_terrain_in_place_mode() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
-    let home = |arm: &MonitoredArm<'_>| arm.device.haptics.scene.expect("a scene").home;
+    let mut arm = pressed(&mut tiles, plane);
+    let home = |arm: &PressedArm<'_>| arm.device.haptics.scene.expect("a scene").home;
     let before = home(&arm);
     let hip = arm.tick().hip;
-    arm.clutch(InPlace);
+    arm.device.send(Command::Clutch(InPlace));
     arm.ticks(105);
-    move_to(&mut arm, [0, DEEP[1] + 1_000, 0], 500);
-    arm.clutch(Released);
+    arm.move_to([0, DEEP[1] + 1_000, 0], 500);
+    arm.device.send(Command::Clutch(Released));
     let back = arm.ticks(510);
     // Cells are millimetres here.
     let moved = hip.to(&back.hip).length();
@@ -210,21 +145,21 @@ fn far_hand_motion_shifts_terrain_in_place_mode() {
 fn with_hand_mode_shifts_terrain_until_clutch_closes() {
     let mut tiles = buffers::<4>();
     for holds in [[InPlace, WithHand, InPlace], [WithHand, InPlace, InPlace]] {
-        let mut arm = MonitoredArm::pressed(&mut tiles, plane);
+        let mut arm = pressed(&mut tiles, plane);
         let hip = arm.tick().hip;
         for hold in holds {
-            arm.clutch(hold);
+            arm.device.send(Command::Clutch(hold));
             arm.ticks(60);
         }
-        move_to(&mut arm, [0, DEEP[1] + 100, 0], 50);
-        arm.clutch(Released);
+        arm.move_to([0, DEEP[1] + 100, 0], 50);
+        arm.device.send(Command::Clutch(Released));
         let back = arm.ticks(510).hip;
         assert!(hip.to(&back).length() < 1e-3, "{holds:?}: {back:?}");
         // The next time starts from zero.
-        arm.clutch(InPlace);
+        arm.device.send(Command::Clutch(InPlace));
         arm.ticks(110);
-        move_to(&mut arm, [0, DEEP[1] + 60, 0], 50);
-        arm.clutch(Released);
+        arm.move_to([0, DEEP[1] + 60, 0], 50);
+        arm.device.send(Command::Clutch(Released));
         let moved = hip.to(&arm.ticks(510).hip).length();
         assert!(moved > 1.0, "{moved} mm");
     }
@@ -233,25 +168,25 @@ fn with_hand_mode_shifts_terrain_until_clutch_closes() {
 #[test]
 fn clutch_stays_open_until_board_input_and_host_release_it() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
+    let mut arm = pressed(&mut tiles, plane);
     let rendered = arm.tick();
     arm.device.send(Command::ClutchInput(true));
     let open = arm.ticks(105);
     let limits = Limits::CLUTCH_OPEN | Limits::CLUTCH_INPUT;
     assert_eq!((open.limits, open.force_n), (limits, Vec3::ZERO));
     // The terrain follows the hand, even if the host requests otherwise.
-    arm.clutch(InPlace);
-    move_to(&mut arm, [0, DEEP[1] + 100, 0], 50);
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(InPlace));
+    arm.move_to([0, DEEP[1] + 100, 0], 50);
+    arm.device.send(Command::Clutch(Released));
     assert_eq!(arm.ticks(50).limits, limits);
-    arm.clutch(InPlace);
+    arm.device.send(Command::Clutch(InPlace));
     arm.device.send(Command::ClutchInput(false));
     assert_eq!(
         arm.ticks(50).limits,
         Limits::CLUTCH_OPEN,
         "the host holds it"
     );
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     let back = arm.ticks(510);
     assert_eq!(back.limits, Limits::empty());
     assert!((back.force_n - rendered.force_n).length() < 1e-3);
@@ -286,10 +221,10 @@ fn held_clutch_input_opens_next_scene_but_no_replay() {
 #[test]
 fn clutch_released_early_opens_fully_then_closes() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, plane);
-    arm.clutch(WithHand);
+    let mut arm = pressed(&mut tiles, plane);
+    arm.device.send(Command::Clutch(WithHand));
     arm.ticks(20);
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     let mut min = f32::MAX;
     for _ in 0..620 {
         min = min.min(arm.tick().force_n.z);
@@ -300,13 +235,14 @@ fn clutch_released_early_opens_fully_then_closes() {
     assert!(arm.last.sample.force_n.z > 2.0);
 }
 
+/// Safety: 15.
 #[test]
 fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
-    arm.clutch(WithHand);
+    let mut arm = pressed(&mut tiles, gentle);
+    arm.device.send(Command::Clutch(WithHand));
     arm.ticks(110);
-    let depth = arm.depth_mm(1.0);
+    let depth = depth_mm(&arm.last.sample);
     assert!(depth > 3.0, "{depth}");
     let ticks_before = arm.last.sample.tick;
     // Half of the samples, at the same size in the hand: zoomed out by two. The height is wrong
@@ -314,15 +250,15 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
     let hip = halved(arm.last.sample.hip);
     let [x, y, z] = hip.cell();
     let wrong = GridPoint::new([x, y, z + 9], hip.frac());
-    arm.put(view(1, 1, wrong), coarse);
+    arm.change(view(1, 1, wrong), coarse);
     arm.ticks(40);
     let sample = arm.last.sample;
     assert_eq!((sample.view, sample.state), (1, ContactState::Touching));
     assert_eq!(sample.force_n, Vec3::ZERO, "not before it is let go");
     assert!(sample.tick > ticks_before, "ticks go on");
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     arm.ticks(510);
-    let now = arm.depth_mm(1.0);
+    let now = depth_mm(&arm.last.sample);
     assert!(now <= depth + 1e-3 && now > 0.5 * depth, "{now} of {depth}");
     assert_eq!(arm.last.sample.limits, Limits::empty());
     assert!(arm.last.sample.force_n.length() > 1.0);
@@ -331,16 +267,16 @@ fn placement_keeps_the_depth_and_the_arm_stays_armed() {
 #[test]
 fn placement_sets_the_position_of_a_free_hip() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
-    move_to(&mut arm, [0, 420, 0], 600);
+    let mut arm = pressed(&mut tiles, gentle);
+    arm.move_to([0, 420, 0], 600);
     assert_eq!(arm.tick().state, ContactState::Free);
-    arm.clutch(InPlace);
+    arm.device.send(Command::Clutch(InPlace));
     arm.ticks(110);
     let [x, y, z] = arm.last.sample.hip.cell();
     let there = GridPoint::new([x + 20, y - 9, z + 3], Vec3::splat(0.25));
-    arm.put(view(1, 0, there), gentle);
+    arm.change(view(1, 0, there), gentle);
     assert!(arm.ticks(40).hip.is_same(&there));
-    arm.clutch(Released);
+    arm.device.send(Command::Clutch(Released));
     let closed = arm.ticks(510);
     assert!(closed.hip.to(&there).length() < 1e-3, "{:?}", closed.hip);
     assert_eq!(
@@ -352,9 +288,9 @@ fn placement_sets_the_position_of_a_free_hip() {
 #[test]
 fn eight_placements_in_a_row_make_no_force_step() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
+    let mut arm = pressed(&mut tiles, gentle);
     for number in 1..=8 {
-        arm.clutch(WithHand);
+        arm.device.send(Command::Clutch(WithHand));
         arm.ticks(101);
         let hip = arm.last.sample.hip;
         let mut change = view(number, 0, hip);
@@ -362,8 +298,8 @@ fn eight_placements_in_a_row_make_no_force_step() {
         change.scene.cell_mm = f32::from(1u16 << number);
         change.keeps_tiles = true;
         let served = arm.device.served;
-        arm.put(change, gentle);
-        arm.clutch(Released);
+        arm.change(change, gentle);
+        arm.device.send(Command::Clutch(Released));
         arm.ticks(550);
         assert!(arm.device.served - served < 5, "its tiles stay");
         assert_eq!(arm.last.sample.view, number);
@@ -371,16 +307,17 @@ fn eight_placements_in_a_row_make_no_force_step() {
     }
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_stays_open_until_a_placement_has_its_tiles() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
-    arm.clutch(WithHand);
+    let mut arm = pressed(&mut tiles, gentle);
+    arm.device.send(Command::Clutch(WithHand));
     arm.ticks(110);
     let change = view(1, 1, halved(arm.last.sample.hip));
     arm.device.send(Command::SceneChange(change));
-    arm.clutch(Released);
-    let outcome = |arm: &mut MonitoredArm<'_>| {
+    arm.device.send(Command::Clutch(Released));
+    let outcome = |arm: &mut PressedArm<'_>| {
         let sense = GuardInputs {
             counts: DEEP,
             dead_man: true,
@@ -405,7 +342,7 @@ fn clutch_stays_open_until_a_placement_has_its_tiles() {
 #[test]
 fn placement_during_contact_disarms_as_another_scene_does() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
+    let mut arm = pressed(&mut tiles, gentle);
     let before = arm.last.sample.force_n;
     let change = view(1, 0, arm.last.sample.hip);
     arm.device.send(Command::SceneChange(change));
@@ -414,26 +351,27 @@ fn placement_during_contact_disarms_as_another_scene_does() {
     assert!((now.sample.force_n - before).length() < 0.1);
 }
 
+/// Safety: 15.
 #[test]
 fn force_rise_rate_stays_bounded_under_random_commands() {
     let mut tiles = buffers::<4>();
-    let mut arm = MonitoredArm::pressed(&mut tiles, gentle);
+    let mut arm = pressed(&mut tiles, gentle);
     let mut rng = 12_345_u32;
     let mut rise_n = 0.0;
     for tick in 0..cases(20_000, 2_000) {
         rng = rng.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         let dice = rng >> 24;
         match dice {
-            0..32 => arm.clutch(WithHand),
-            32..64 => arm.clutch(InPlace),
-            64..150 => arm.clutch(Released),
+            0..32 => arm.device.send(Command::Clutch(WithHand)),
+            32..64 => arm.device.send(Command::Clutch(InPlace)),
+            64..150 => arm.device.send(Command::Clutch(Released)),
             150..155 => arm.device.send(Command::ClutchInput(true)),
             155..160 => arm.device.send(Command::ClutchInput(false)),
             160..200 if arm.last.sample.limits.contains(Limits::CLUTCH_OPEN) => {
                 let mut change = view(tick as u8, 0, arm.last.sample.hip);
                 change.scene.cell_mm = [0.5, 1.0, 2.0][dice as usize % 3];
                 change.keeps_tiles = dice.is_multiple_of(2);
-                arm.put(change, gentle);
+                arm.change(change, gentle);
             }
             _ => {}
         }
@@ -446,6 +384,7 @@ fn force_rise_rate_stays_bounded_under_random_commands() {
     assert!(rise_n <= max, "{rise_n} N came in, {max} at most");
 }
 
+/// Safety: 15.
 #[test]
 fn held_clutch_does_not_allow_arming_inside_the_ground() {
     let mut tiles = buffers::<4>();

@@ -105,7 +105,7 @@ impl<'a> TileMaterials<'a> {
                     .flat_map(|[material, more]| {
                         core::iter::repeat_n(*material, usize::from(*more) + 1)
                     })
-                    // An incomplete run gives a material that no table has.
+                    // An incomplete run is a material that no table has.
                     .chain(rest.iter().map(|_| u8::MAX));
                 tile.set_materials(count, samples)
             }

@@ -33,7 +33,7 @@ pub enum ToDevice<'a> {
     Tile(TileMessage<'a>),
     /// A haptic interface point for one tick, in a scene fed by points.
     Hip(HipCommand),
-    /// Shows that the host is alive. Answered by [`ToHost::Heartbeat`].
+    /// Shows that the host is connected. Answered by [`ToHost::Heartbeat`].
     Heartbeat,
     /// Requests an action, to be done once.
     Request {
@@ -55,14 +55,15 @@ pub enum ToDevice<'a> {
     /// Closes the session: disarms and drops the scene. Answered by [`ToHost::Goodbye`] when the
     /// amplifiers are off.
     Bye,
-    /// Reports that the host received the goodbye and leaves. The emulated board then ends its
-    /// program.
+    /// Reports that the host received [`ToHost::Goodbye`] and leaves. The emulated board then ends
+    /// its program.
     Close,
     /// Closes the session without a change to arm or scene: the host has only read. Answered by
     /// [`ToHost::Detached`].
     Detach,
-    /// A new placement of the present scene, while the clutch is open ([`Request::Clutch`]) or under
-    /// a pressing hand: the arm stays armed. Answered by [`ToHost::SceneAck`] with the epoch of the new scene.
+    /// A new placement of the present scene, while the clutch is open ([`Request::Clutch`]) or
+    /// under a pressing hand: the arm stays armed. Answered by [`ToHost::SceneAck`] with the epoch
+    /// of the new scene.
     SceneChange(SceneChange),
     /// The same as [`Self::Scene`], for a scene with materials.
     #[serde(borrow)]

@@ -1,6 +1,16 @@
 //! The link between device and host: one table of messages, one framing. This page is the
 //! specification of the protocol.
 //!
+//! - [`message`]: the table of messages of each end;
+//! - [`frame`]: encoding and reading of frames;
+//! - [`version`]: the frames with which two protocol versions detect each other;
+//! - [`session`]: the session of a frame, its end, and the number of its samples;
+//! - [`hello`]: the messages that open a session;
+//! - [`request`]: requests of a host, and their answers;
+//! - [`status`]: start, guard and measurements of a device;
+//! - [`tile`], [`materials`]: the heights of a tile; its materials, and the table of a scene;
+//! - [`plant`]: the emulated board's second line, to the virtual arm.
+//!
 //! # Frames
 //!
 //! Every frame is serialised with postcard, followed by its CRC-32 (ISO-HDLC,
@@ -29,25 +39,25 @@
 //! ```
 //!
 //! The line may lose, damage, delay, repeat and reorder frames. So a message is either repeated
-//! until it is answered, or does no harm if it is lost (telemetry, which is counted) or arrives
+//! until it is answered, or is harmless if it is lost (telemetry, which is counted) or arrives
 //! twice.
 //!
 //! # The host
 //!
 //! | state | sends | exit | time-out |
 //! | --- | --- | --- | --- |
-//! | closed | nothing | a command to open: greeting | |
-//! | greeting | a version check and a hello, every 0.4 s | the device's hello: scene sent, or open if there is no scene. A refusal with another protocol: an error | after 4 s, even if other frames arrive |
+//! | closed | nothing | a command to open: opening | |
+//! | opening | a version check and a hello, every 0.4 s | the device's hello: scene sent, or open if there is no scene. A refusal with another protocol: an error | after 4 s, even if other frames arrive |
 //! | scene sent | the scene, every 0.4 s; after 0.75 s without an answer also a hello | the scene is accepted: open. It is refused: an error | after 4 s, even if other frames arrive |
 //! | open | a heartbeat, every 0.5 s of its own or of the device's time; its request and its queries, every 0.4 s; tiles and points; after 0.75 s without an answer a hello, every 0.4 s | a command to leave: leaving. A hello of a device that was restarted (another hello opened the session) or stores another scene: scene sent | after 4 s without an answer; after 1.5 s if frames of another session arrive meanwhile: another host uses the device |
 //! | leaving | a hello and a bye, every 0.4 s; answers no more requests for tiles | goodbye: sends close once and is closed | after 3 s: an error reports that the board may be armed |
 //! | detaching | a hello and a detach, every 0.4 s | detached: closed | after 3 s |
 //!
-//! A host that has sent no scene and requested nothing that drives leaves by detaching: it does not
-//! change what another host left.
+//! A host that has sent no scene, and requested nothing that drives, detaches instead of closing:
+//! the state set by another host is unchanged.
 //!
-//! A session that the device has closed stays closed, even if its host does not know. The host
-//! receives a session-closed message in answer to its hello. It accepts that only for its own
+//! A session that the device has closed stays closed, also if its host has missed the close. The
+//! host receives a session-closed message in answer to its hello. It accepts that only for its own
 //! session and its last hello: a late message from an earlier session, or from before a restart of
 //! the device, is not about the present one. If another session was opened since then, another host
 //! uses the device: an error at once in every state except detaching, which becomes closed. If the
@@ -93,7 +103,7 @@
 //! - A hello with a silence time of zero, of a session that is not open, opens none: its host only
 //!   reads. The hello is answered, and so are its queries for status and calibration, with the
 //!   number of its own session; the device stores the last such host. A host that only reads does
-//!   not take an arm from its host, and does not keep an arm armed whose host has gone.
+//!   not end another host's session, and does not keep an arm armed whose host has left.
 //! - The previous session in a hello is the last one that was not detached. A host that only reads
 //!   does not hide its end.
 //! - A wait for a press of the dead-man switch (an arm command before anything is driven, a

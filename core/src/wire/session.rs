@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A session's number. The host draws it at random for each session, so that late frames of one
-/// session are not taken for frames of another.
+/// session are not mistaken for frames of another.
 ///
 /// No number is below 128: its first byte on the wire has its highest bit set, which distinguishes
 /// a frame of a session from a [`VersionCheck`](super::version::VersionCheck).

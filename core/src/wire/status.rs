@@ -239,7 +239,7 @@ mod tests {
             };
             boot.is_brown_out_level_low()
         };
-        assert!(!is_low(0), "no chip says so");
+        assert!(!is_low(0), "no chip reports it");
         assert!(is_low(1_700) && is_low(2_500) && !is_low(2_700) && !is_low(2_800));
     }
 }

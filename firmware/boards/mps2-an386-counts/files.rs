@@ -52,7 +52,7 @@ impl Frames {
                 self.from += end + 1;
                 let (_, frame) = self.reader.push(&bytes[..=end]);
                 let frame = frame.expect("a frame").expect("well encoded");
-                return Some(decode(frame).expect("a known message"));
+                return Some(decode(frame).expect("a valid message"));
             }
             let _ = self.reader.push(bytes);
             self.from = self.to;

@@ -150,7 +150,7 @@ fn points(scene: &Scene, table: &MaterialTable, frames: &mut Frames, records: &m
                 count = set_scene(&mut haptics, &both.scene, &table);
             }
             ToDevice::MaterialTile(tile) => {
-                let buffer = spare.take().expect("every tile gives a buffer back");
+                let buffer = spare.take().expect("every tile returns a buffer");
                 fill_material_tile(buffer, &tile, count);
                 spare = haptics.accept(Command::Tile(buffer)).ok().flatten();
             }
@@ -262,7 +262,7 @@ fn store_tiles(
 ) -> Option<u32> {
     while let Some(message) = frames.next() {
         let spare = spares.iter_mut().find(|spare| spare.is_some());
-        let spare = spare.expect("what is not kept comes back");
+        let spare = spare.expect("a buffer that is not kept is returned");
         let buffer = spare.take().expect("found");
         match message {
             ToDevice::Tile(tile) => fill_tile(buffer, &tile).expect("the host made it well"),

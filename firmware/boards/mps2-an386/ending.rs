@@ -19,7 +19,7 @@ pub(crate) fn done() -> ! {
 pub(crate) fn failed(why: fmt::Arguments<'_>) -> ! {
     let uart = report_uart();
     uart.enable(Uart::ENABLE);
-    // Without a reader the program ends too.
+    // Without a reader, the program also ends.
     let _ = writeln!(Report(uart), "{why}");
     SCB::sys_reset()
 }

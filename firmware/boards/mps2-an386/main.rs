@@ -141,7 +141,7 @@ impl LinkBoard for Emulated {
 
     fn after_poll<const D: usize>(&self, link: &Link<'_, D>) {
         if link.has_ended() {
-            defmt::info!("the host said goodbye");
+            defmt::info!("the host closed the session");
             ending::done();
         }
         // There is no watchdog here, but the tick expects one to be fed.

@@ -53,7 +53,7 @@ pub(crate) fn release(reason: Reason) {
     }
 }
 
-/// The two timers as the application sees them.
+/// The two timers in the application's time.
 pub(crate) struct Clock;
 
 impl TickClock for Clock {

@@ -42,7 +42,7 @@ const SEQUENCE: Injected = Injected(pac::ADC2);
 /// MCR.HFSEL: a channel's wait on a bus faster than 160 MHz.
 const FASTEST_BUS: u8 = 0b10;
 
-/// Takes the converters and their pins, which are analogue since the reset. A channel is switched
+/// Claims the converters and their pins, which are analogue since the reset. A channel is switched
 /// on only after it has the code for no current: its initial 0 V would be beyond full scale.
 /// embassy's own function switches a channel on before it sets a code.
 pub(crate) fn new(

@@ -41,8 +41,8 @@ static NOT_AS_SET: AtomicBool = AtomicBool::new(true);
 
 pub(crate) type Outputs = Ad5754<Bus>;
 
-/// Takes the outputs' parts from the chip's peripherals. A macro, because a function would need all
-/// of them.
+/// Moves the outputs' parts out of the chip's peripherals. A macro, because a function would need
+/// all of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.SPI4, $p.PE12, $p.PE14, $p.PE13, $p.PE11)

@@ -6,7 +6,7 @@ use embassy_stm32::peripherals::PE15;
 
 pub(crate) type EmergencyStop = Input<'static>;
 
-/// Takes the pin from the chip's peripherals, as `take_outputs` does.
+/// Moves the pin out of the chip's peripherals, as `take_outputs` does.
 macro_rules! take_stop {
     ($p:ident) => {
         crate::stop::new($p.PE15)

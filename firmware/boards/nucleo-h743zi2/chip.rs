@@ -265,7 +265,7 @@ pub(crate) fn resets_below_mv() -> u16 {
 
 /// Lets the watchdog and the clock of embassy's time run while a debugger halts the core, whatever
 /// the debugger has set: the watchdog resets the chip, and by the clock the next tick detects the
-/// halt. TIM15, which lets the duty cycles continue, runs too. TIM1 stops in the halt; its outputs
+/// halt. TIM15, which keeps the duty cycles running, also runs. TIM1 stops in the halt; its outputs
 /// are then off as by a break (RM0433, 38.3.28).
 pub(crate) fn set_debug_freeze() {
     pac::DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(false));

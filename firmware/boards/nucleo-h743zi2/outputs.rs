@@ -36,8 +36,8 @@ pub(crate) struct Outputs {
     max: u16,
 }
 
-/// Takes the outputs' parts from the chip's peripherals. A macro, because a function would need all
-/// of them.
+/// Moves the outputs' parts out of the chip's peripherals. A macro, because a function would need
+/// all of them.
 macro_rules! take_outputs {
     ($p:ident) => {
         crate::outputs::new($p.TIM1, $p.TIM15, $p.PE9, $p.PE11, $p.PE13)

@@ -34,7 +34,7 @@ fn amplifiers_are_on() -> bool {
     GPIOF.odr().read().odr(3) == Odr::HIGH
 }
 
-/// Takes the pin from the chip's peripherals, as `take_outputs` does.
+/// Moves the pin out of the chip's peripherals, as `take_outputs` does.
 macro_rules! take_stop {
     ($p:ident) => {
         crate::stop::new($p.PE15)

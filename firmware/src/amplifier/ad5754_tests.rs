@@ -122,6 +122,7 @@ fn every_register_is_read_back() {
     assert_eq!(requested, [0x80, 0x81, 0x82, 0x88, 0x89, 0x8A, 0x90]);
 }
 
+/// Safety: 20.
 #[test]
 fn enable_stays_low_until_all_registers_read_back() {
     for ticks in 0..10 {
@@ -137,6 +138,7 @@ fn enable_stays_low_until_all_registers_read_back() {
     }
 }
 
+/// Safety: images.
 #[test]
 fn lost_range_or_overload_is_reported_within_seven_ticks() {
     for lose in [
@@ -156,7 +158,7 @@ fn lost_range_or_overload_is_reported_within_seven_ticks() {
         assert!(reported.is_some());
         assert!(!pin.is_high());
         (0..20).for_each(|_| off.set_held_outputs([0.0; 3]));
-        assert!(wires.0.borrow().as_set, "set up anew");
+        assert!(wires.0.borrow().as_set, "set up again");
         assert_eq!(wires.0.borrow().range, [4; 4]);
     }
 }
@@ -173,6 +175,7 @@ fn broken_wire_is_reported_at_once_and_blocks_enable() {
     assert!(!pin.is_high());
 }
 
+/// Safety: 19.
 #[test]
 fn held_outputs_are_written_disabled_and_zeroed_before_enable() {
     let (mut off, wires, pin) = off();

@@ -36,6 +36,7 @@ mod tests {
     /// Error of an ESCON's reading of a duty cycle, s.
     const ESCON_READS_S: f64 = 5e-6;
 
+    /// Safety: 21, images.
     #[test]
     fn full_scale_duty_stays_clear_of_escon_broken_wire_range() {
         // The timer's counts at 228 MHz, and smaller ones.

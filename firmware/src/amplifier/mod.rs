@@ -55,8 +55,8 @@ pub struct Off<O, E> {
 pub struct On<O, E>(Off<O, E>);
 
 impl<O: CurrentOutputs, E: OutputPin> Off<O, E> {
-    /// Takes the outputs for axes 1 to 3, the enable pin (high: on), and the current in amperes at
-    /// full scale. Switches off first.
+    /// Creates the amplifiers from the outputs for axes 1 to 3, the enable pin (high: on), and the
+    /// current in amperes at full scale. Switches off first.
     pub fn new(outputs: O, enable: E, full_scale_a: f32) -> Self {
         let mut off = Self {
             outputs,

@@ -33,6 +33,7 @@ mod tests {
         3.3 * f64::from(code) / 4096.0
     }
 
+    /// Safety: 21, images.
     #[test]
     fn full_scale_stays_where_a_buffered_output_is_specified() {
         for fraction in [-1.0, 1.0] {

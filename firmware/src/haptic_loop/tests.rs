@@ -77,6 +77,7 @@ fn wave(haptic_loop: &mut Loop, from: i32, ticks: i32) -> i32 {
     from + 100 * ticks
 }
 
+/// Safety: 35.
 #[test]
 fn arm_is_monitored_in_every_tick_of_a_replay() {
     let (mut haptic_loop, mut link_ends) = looped(Source::Encoders);
@@ -97,7 +98,7 @@ fn arm_is_monitored_in_every_tick_of_a_replay() {
     tile.fill(key, 1, |_, _| 0.5).unwrap();
     assert!(link_ends.commands.enqueue(Command::Tile(tile)).is_ok());
     let at = wave(&mut haptic_loop, at, 50);
-    assert!(haptic_loop.unsent.is_some(), "the case that is meant");
+    assert!(haptic_loop.unsent.is_some(), "the case under test");
     drain(&mut link_ends);
     let at = wave(&mut haptic_loop, at, 2);
     // And then the arm is rendered.
@@ -223,13 +224,14 @@ fn debounced_clutch_input_opens_the_clutch() {
     assert_eq!(limits(6, true), opening);
     let open = Limits::CLUTCH_INPUT | Limits::CLUTCH_OPEN;
     for _ in 0..3 {
-        assert_eq!(limits(30, true), opening, "it takes 0.1 s");
+        assert_eq!(limits(30, true), opening, "the clutch opens in 0.1 s");
     }
     assert_eq!(limits(30, true), open);
     assert_eq!(limits(19, false), open);
     assert_eq!(limits(2, false), Limits::CLUTCH_MOVES);
 }
 
+/// Safety: 7.
 #[test]
 fn refused_scene_leaves_nothing_to_render() {
     for source in [Source::Encoders, Source::Points] {

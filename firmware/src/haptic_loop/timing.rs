@@ -124,7 +124,7 @@ mod tests {
         clock.now = 20;
         assert!(
             !timing.end(&clock, began),
-            "this tick's own event was taken"
+            "this tick's own event was consumed"
         );
         let began = timing.begin(&mut clock);
         clock.now = 21;
@@ -147,6 +147,7 @@ mod tests {
         assert_eq!(timing.late, 2);
     }
 
+    /// Safety: 42.
     #[test]
     fn gap_is_detected_above_one_and_a_half_periods() {
         let mut timing = Timing::new::<Fake>();

@@ -169,7 +169,7 @@ impl DeviceState {
         self.mark
     }
 
-    /// Ends the wait for a press, because its host is gone: a later press would have another
+    /// Ends the wait for a press, because its host has left: a later press would have another
     /// purpose.
     pub(super) fn cancel_press(&mut self) {
         if matches!(self.storing, Storing::AwaitingPress(_)) {
@@ -206,7 +206,7 @@ impl DeviceState {
         }
     }
 
-    /// Checks that the fault to clear is the one that the host has seen.
+    /// Checks that the fault to clear is the one reported to the host.
     pub(super) fn may_clear(&self, acknowledged: Option<Fault>) -> Result<(), Refusal> {
         match self.health.report.fault {
             Some(fault) if Some(fault) != acknowledged => {

@@ -25,7 +25,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Returns true if the board is to enter its loader: the host has requested it and received the
-    /// answer, the amplifiers are off, and the loop holds no output.
+    /// answer, the amplifiers are off, and the loop has no held output.
     #[must_use]
     pub fn is_loader_due(&self) -> bool {
         let is_requested = self.loader == LoaderEntry::Requested;

@@ -27,7 +27,7 @@ pub(super) fn host_silent() {
 
 pub(super) fn refused(protocol: u16) {
     #[cfg(feature = "defmt")]
-    defmt::warn!("refused a host that speaks protocol {}", protocol);
+    defmt::warn!("refused a host of protocol {}", protocol);
 }
 
 pub(super) fn scene(epoch: u32, accepted: bool) {

@@ -14,9 +14,9 @@
 //!   and keeps the scene and all stored tiles, so that a returning host continues where it was.
 //! - If the host falls silent, the arm renders the stored tiles until the host's time-out; then it
 //!   is disarmed.
-//! - A placement changes while no force is rendered, or under a pressing hand with the force that
-//!   the hand feels; the arm stays armed.
-//! - A goodbye is answered once the amplifiers are off.
+//! - A placement changes while no force is rendered, or under a pressing hand from the
+//!   present force on; the arm stays armed.
+//! - A bye is answered once the amplifiers are off.
 
 mod commands;
 mod device_state;

@@ -97,7 +97,7 @@ impl<const D: usize> Link<'_, D> {
         let is_flushed = self.samples.is_empty() && self.tx.is_telemetry_sent();
         if is_closing && is_flushed && !self.device.may_drive && self.tx.has_room() {
             self.send(&ToHost::Goodbye(self.sample_count()));
-            self.session.answer_goodbye();
+            self.session.answer_close();
             log::ended();
         }
     }

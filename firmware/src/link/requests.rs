@@ -35,7 +35,7 @@ impl Progress {
 }
 
 /// The latest request of the session. The host sends the next one only after this one was answered
-/// or given up.
+/// or cancelled.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LatestRequest {
     latest: Option<(u8, Progress)>,

@@ -21,9 +21,9 @@ const ABSENT_MS: u32 = 2_000;
 /// | any | open | [`Session::open`] |
 /// | open, detached, ended by silence | closing | [`Session::begin_close`] |
 /// | open | detached | [`Session::detach`] |
-/// | closing | ended by goodbye | [`Session::answer_goodbye`] |
+/// | closing | ended by its host | [`Session::answer_close`] |
 /// | open, detached | ended by silence | [`Session::end_silent`] |
-/// | ended by goodbye | acknowledged | [`Session::close`] |
+/// | ended by its host | acknowledged | [`Session::close`] |
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum SessionState {
     /// No host has sent an open message.
@@ -119,7 +119,7 @@ impl Session {
     }
 
     /// Records that the close was answered.
-    pub(super) const fn answer_goodbye(&mut self) {
+    pub(super) const fn answer_close(&mut self) {
         self.state = SessionState::Ended(SessionEnd::Goodbye);
     }
 

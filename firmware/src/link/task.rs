@@ -80,7 +80,7 @@ pub async fn run<const D: usize>(
                     break;
                 }
                 let bytes = chunk.get(..n).unwrap_or(&[]);
-                // A host that does not read, or is gone, can block the writer for any time. The
+                // A host that does not read, or has left, can block the writer for any time. The
                 // link continues with the loop.
                 let polling = async {
                     loop {

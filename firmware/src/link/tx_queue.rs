@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn full_queue_has_room_after_bytes_are_taken() {
+    fn full_queue_has_room_after_bytes_are_removed() {
         let mut queue = TxQueue::new();
         let mut pushed = 0;
         while queue.has_room() {

@@ -55,6 +55,8 @@ fn power_up_or_unknown_reset_assumes_hot_motors() {
 }
 
 /// A reset during a write leaves only some of its words.
+///
+/// Safety: 12.
 #[test]
 fn truncated_copy_leaves_the_previous_one_valid() {
     let (old, new) = (after(100, |_| WARM), after(200, |_| WARMER));

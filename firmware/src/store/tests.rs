@@ -147,6 +147,8 @@ fn store<const W: usize, const E: usize>(
 }
 
 /// An older firmware may have accepted it.
+///
+/// Safety: 18.
 #[test]
 fn record_above_a_limit_is_refused_without_falling_back() {
     let mut store = store(Flash::<8, 2048>::new(4096), 2048);
@@ -236,6 +238,7 @@ fn cut_everywhere<const W: usize, const E: usize>(size: usize, savings: usize, c
     assert!(cuts > 9 * savings, "{cuts}");
 }
 
+/// Safety: 17.
 #[test]
 fn power_lost_at_any_step_leaves_the_old_record_or_the_new() {
     for checks in [false, true] {

@@ -8,7 +8,7 @@ use super::PACKET;
 /// A bulk endpoint as a stream of bytes.
 pub struct BulkStream<E> {
     endpoint: E,
-    /// True if the host uses the interface, as far as this end knows.
+    /// True if the host uses the interface, by the last event at this end.
     up: bool,
 }
 

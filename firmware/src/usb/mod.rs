@@ -2,7 +2,7 @@
 //! direction, identified by these numbers.
 //!
 //! Windows needs no driver (WinUSB, by Microsoft OS 2.0 descriptors); on Linux, the rule in
-//! `host-tools/udev/` gives users access. The stack is embassy-usb over any driver: the boards'
+//! `host-tools/udev/` grants users access. The stack is embassy-usb over any driver: the boards'
 //! peripherals, or in tests a scripted host.
 
 #[cfg(feature = "usb")]

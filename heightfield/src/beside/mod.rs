@@ -175,7 +175,7 @@ fn whole_text(file: FileBytes) -> Result<(String, String), RasterError> {
     let bytes = file.head(MAX_TEXT + 1)?;
     if bytes.len() as u64 > MAX_TEXT {
         return Err(RasterError::AbsurdSize(format!(
-            "{name} beside it is larger than {MAX_TEXT} bytes: no such text is"
+            "{name} beside it is larger than {MAX_TEXT} bytes, the limit of such texts"
         )));
     }
     Ok((String::from_utf8_lossy(&bytes).into_owned(), name))

@@ -91,9 +91,9 @@ impl Notes {
     pub(crate) fn apply(self, decoded: &mut Decoded) {
         let name = self.name.as_str();
         let mut remarks = self.remarks;
-        let mut differ = |what: &str, own: String, theirs: String, taken: &str| {
+        let mut differ = |what: &str, own: String, theirs: String, used: &str| {
             remarks.push(format!(
-                "{what}: the file says {own}, {name} beside it {theirs}; {taken} is taken"
+                "{what}: the file states {own}, {name} beside it {theirs}; {used} is used"
             ));
         };
         if let Some(value) = self.no_data {
@@ -147,7 +147,7 @@ impl Decoded {
             let (system, vertical) = reference_system(text);
             match system {
                 None => self.remarks.push(format!(
-                    "{name} beside it names no reference system that is known here: it is not used"
+                    "{name} beside it names no supported reference system: it is not used"
                 )),
                 Some(system) => {
                     if self
@@ -156,7 +156,7 @@ impl Decoded {
                         .is_some_and(|own| !is_same(own, &system))
                     {
                         self.remarks.push(format!(
-                            "reference system: the file says {}, {name} beside it {}; the latter is taken",
+                            "reference system: the file states {}, {name} beside it {}; the latter is used",
                             self.system.as_ref().map_or("", |own| own.name()),
                             system.name()
                         ));
@@ -172,14 +172,14 @@ impl Decoded {
         let map = match place.map(ground_map) {
             Some(None) => {
                 self.remarks.push(format!(
-                    "{name} beside it places the samples nowhere: it is not used"
+                    "{name} beside it states no valid place of the samples: it is not used"
                 ));
                 None
             }
             Some(Some(map)) => {
                 if self.place.is_some_and(|own| !own.map.is_near(&map)) {
                     self.remarks.push(format!(
-                        "place: the file and {name} beside it differ; the latter is taken"
+                        "place: the file and {name} beside it differ; the latter is used"
                     ));
                 }
                 Some(map)

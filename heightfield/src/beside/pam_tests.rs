@@ -77,7 +77,7 @@ fn notes_that_contradict_the_file_are_reported() {
     );
     let stated = raster.remarks().join(" ");
     assert!(
-        stated.contains("the file says -9999") && raster.summary().no_data == 1,
+        stated.contains("the file states -9999") && raster.summary().no_data == 1,
         "{stated}"
     );
 }

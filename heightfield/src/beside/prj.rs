@@ -24,7 +24,7 @@ pub(crate) fn reference_system(
     let (system, vertical) = ReferenceSystem::from_wkt(&wkt);
     if system.is_none() {
         decoded.remarks.push(format!(
-            "{name} beside it names no reference system that is known here: it is not used"
+            "{name} beside it names no supported reference system: it is not used"
         ));
     }
     decoded.system = system;

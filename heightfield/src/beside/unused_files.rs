@@ -31,9 +31,9 @@ pub(crate) fn remark_unread(input: &FileBytes, decoded: &mut Decoded) {
         let name = found.file_name().unwrap_or_default().to_string_lossy();
         // A file that was opened has its own remark.
         if !decoded.remarks.iter().any(|remark| remark.contains(&*name)) {
-            decoded
-                .remarks
-                .push(format!("{name} beside it may hold {what}: it is not read"));
+            decoded.remarks.push(format!(
+                "{name} beside it may contain {what}: it is not read"
+            ));
         }
     }
 }

@@ -31,7 +31,7 @@ pub(crate) fn remark_other_place(input: &FileBytes, own: &[&'static str], decode
         && !map.is_near(&place.map)
     {
         decoded.remarks.push(format!(
-            "place: the file and {name} beside it differ; the former is taken"
+            "place: the file and {name} beside it differ; the former is used"
         ));
     }
 }
@@ -49,7 +49,7 @@ fn find(
         };
         let map = read(&text).ok_or_else(|| {
             RasterError::damaged(format!(
-                "{name} beside it is no world file: six numbers are wanted, the steps not zero"
+                "{name} beside it is no world file: six numbers are required, the steps not zero"
             ))
         })?;
         return Ok(Some((map, name)));

@@ -22,6 +22,8 @@ pub(super) struct BlockState {
     pending: HashMap<Key, Instant>,
     /// Last error of the connection.
     pub(super) outage: Option<RasterError>,
+    /// True if a block was missing in a read that waited, since the outage was last reported.
+    pub(super) lacked_block: bool,
 }
 
 impl BlockState {
@@ -32,6 +34,7 @@ impl BlockState {
             unreadable: 0,
             pending: HashMap::new(),
             outage: None,
+            lacked_block: false,
         }
     }
 

@@ -1,5 +1,5 @@
 //! Coarse images of a file without overviews: every 8th, 64th and 512th sample of its full image,
-//! as far as they are known.
+//! as far as they were read.
 //!
 //! Every decoded block contributes its coarse samples. Each step is eight times the previous one,
 //! so a tile of any level lies in 25 pieces at most, and all three images together have a sixtieth

@@ -130,10 +130,7 @@ mod tests {
             let bits =
                 |piece: &Piece| Vec::from_iter(piece.values[1..].iter().map(|v| v.to_bits()));
             assert_eq!(bits(&back), bits(&piece));
-            assert!(
-                back.values[0].is_nan(),
-                "of what is not known nothing is kept"
-            );
+            assert!(back.values[0].is_nan(), "unknown samples are not stored");
             for other in [0, 1, encoded.len() - 1] {
                 assert!(decoded(&encoded[..other], values.len()).is_none());
             }

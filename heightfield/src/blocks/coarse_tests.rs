@@ -208,7 +208,7 @@ fn repeated_read_is_cached_and_fine_level_fills_coarse_levels() {
     assert!((1..=9 * 5).contains(&first), "{first}");
     check(&raster, 8, USUAL);
     assert_eq!(reader_state.reads(), 0);
-    // Blocks that are read contribute their coarse samples, too.
+    // Blocks that are read also contribute their coarse samples.
     check(&raster, 0, USUAL);
     assert_eq!(
         reader_state.reads(),
@@ -256,6 +256,7 @@ fn same(one: &[f64], other: &[f64]) {
     assert_eq!(bits(one), bits(other));
 }
 
+/// Safety: 29.
 #[test]
 fn nonblocking_read_loads_coarse_level_in_background() {
     let reader_state = ReaderState::new("");
@@ -270,7 +271,7 @@ fn nonblocking_read_loads_coarse_level_in_background() {
     assert_eq!(
         read_tile(&raster, 8, Wait::Never),
         None,
-        "nothing is known yet, and nobody waits"
+        "no sample is read yet, and no read waits"
     );
     same(&wait_for_level(&raster, 8), &waited);
     let this = thread::current().id();
@@ -278,6 +279,7 @@ fn nonblocking_read_loads_coarse_level_in_background() {
     assert!(!threads.is_empty() && !threads.contains(&this));
 }
 
+/// Safety: 29.
 #[test]
 fn nonblocking_read_loads_fine_block_in_background() {
     let reader_state = ReaderState::new("");
@@ -287,7 +289,7 @@ fn nonblocking_read_loads_fine_block_in_background() {
     reader_state.threads.lock().expect("alone").clear();
     let mut columns = 1000..1010;
     let uncached = columns.find(|column| height(*column, 1000, USUAL) > 0.0);
-    let uncached = uncached.expect("no hole");
+    let uncached = uncached.expect("no missing sample");
     assert_eq!(height_at(uncached).1, ReadStatus::Pending);
     assert!(height_at(300).0 > 0.0, "it is in memory");
     wait_until("the block", || height_at(uncached).0 > 0.0);
@@ -473,7 +475,7 @@ fn prefetch_reads_in_background_and_skips_oversized_areas() {
 }
 
 #[test]
-fn windows_hold_their_rows_and_report_pending_heights() {
+fn windows_contain_their_rows_and_report_pending_heights() {
     let raster = raster(&ReaderState::new(""), &DiskCache::off(), USUAL);
     let window = Window {
         column: 700,

@@ -250,9 +250,12 @@ impl Shared {
         !self.fine_queue.is_idle()
     }
 
-    /// Returns the last error of the connection, if a block is missing.
+    /// Returns the last error of the connection, if a read that waited lacked a block since the last
+    /// call. Other reads are repeated until the block arrives.
     pub(super) fn take_outage(&self) -> Option<RasterError> {
-        self.state().outage.take()
+        let mut state = self.state();
+        let lacked_block = std::mem::take(&mut state.lacked_block);
+        state.outage.take_if(|_| lacked_block)
     }
 
     fn state(&self) -> MutexGuard<'_, BlockState> {
@@ -308,7 +311,11 @@ impl Shared {
             return Ok(None);
         };
         let [across, down] = of.block;
-        let Some(block) = self.block(image, [column / across, row / down], wait)? else {
+        let block = self.block(image, [column / across, row / down], wait);
+        if block.is_err() && wait == Wait::UntilRead {
+            self.state().lacked_block = true;
+        }
+        let Some(block) = block? else {
             return Ok(None);
         };
         let columns = of.part([column / across, row / down]).columns as usize;

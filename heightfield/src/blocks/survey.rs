@@ -114,7 +114,7 @@ impl Shared {
     fn warn_of_search(&self, count: usize, parts: usize) {
         let name = (self.path.get()).map_or("the file".into(), |path| without_key(path));
         tracing::warn!(
-            "{count} places of {name} have no height: all {parts} are looked at until one has, which may take a while"
+            "{count} places of {name} have no height: all {parts} are searched until one has, which may take a while"
         );
     }
 
@@ -131,7 +131,9 @@ impl Shared {
     /// Reads the samples of a part that is not a block: it is not cached, and nothing around it is
     /// read.
     fn add_part(&self, image: usize, part: &Part, mut add: impl FnMut(Option<f64>)) {
-        let block = self.read(image, part).ok().and_then(|read| read.block);
+        let read = self.read(image, part);
+        self.state().lacked_block |= read.is_err();
+        let block = read.ok().and_then(|read| read.block);
         for index in 0..part.columns as usize * part.rows as usize {
             add(block.as_ref().and_then(|block| block.stored(index)));
         }
@@ -156,7 +158,8 @@ impl Shared {
     }
 }
 
-/// Returns the blocks of an image that hold samples, or evenly spread ones if there are too many.
+/// Returns the blocks of an image that contain samples, or evenly spread ones if there are too
+/// many.
 pub(crate) fn stored_parts(of: &BlockImage, is_stored: impl Fn(&Part) -> bool) -> Vec<Part> {
     let [across, down] = of.counts();
     let every = || (0..down).flat_map(|row| (0..across).map(move |column| [column, row]));

@@ -1,4 +1,4 @@
-//! A field with a known formula, read in blocks.
+//! A field of a stated formula, read in blocks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -329,9 +329,23 @@ fn cached_block_is_read_while_another_block_loads() {
 fn missing_block_is_reported_at_each_read() {
     let blocks = Blocks::new(Box::new(slow(true)));
     let missing = || blocks.stored(0, BLOCK[0], 0, Wait::UntilRead);
-    // The second time, its state is known without a read.
+    // The second time, its state is cached.
     assert_eq!((missing(), missing()), (Err(NotLoaded), Err(NotLoaded)));
     assert_eq!(blocks.stored(0, 0, 0, Wait::UntilRead), Ok(Some(1.0)));
+}
+
+/// A read that does not wait is repeated until the block arrives: no result lacks its heights.
+#[test]
+fn only_waiting_reads_report_an_outage() {
+    let blocks = Blocks::new(Box::new(slow(true)));
+    let missing = |wait| assert_eq!(blocks.stored(0, BLOCK[0], 0, wait), Err(NotLoaded));
+    missing(Wait::Never);
+    while blocks.is_reading() {
+        std::thread::yield_now();
+    }
+    assert!(blocks.take_outage().is_none());
+    missing(Wait::UntilRead);
+    assert!(blocks.take_outage().is_some() && blocks.take_outage().is_none());
 }
 
 #[test]

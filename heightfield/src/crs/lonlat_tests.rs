@@ -46,7 +46,7 @@ fn longitudes_and_latitudes_are_those_of_wgs_84() {
         };
         let found = system.to_lonlat(place).expect("in reach");
         let off = off_m(found, expected);
-        assert!(off < within_m, "{code}: {off} m off, {within_m} m said");
+        assert!(off < within_m, "{code}: {off} m off, {within_m} m stated");
         let back = system.from_lonlat(found).expect("in reach");
         let off = (back.0 - place.0).hypot(back.1 - place.1);
         let tolerance = if place.0 > 1e3 { 1e-2 } else { 1e-7 };

@@ -48,7 +48,7 @@ impl ReferenceSystem {
         })
     }
 
-    /// Returns the system of a text by libgdal: by its code, if libgdal finds one that is known.
+    /// Returns the system of a text by libgdal: by its code, if libgdal finds a supported one.
     fn by_gdal(text: &str) -> Option<Self> {
         let remembered = || REMEMBERED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, system)) = remembered().iter().find(|(known, _)| known == text) {

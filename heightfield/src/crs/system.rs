@@ -89,7 +89,7 @@ impl ReferenceSystem {
         let own = metres / self.scale;
         (self.scale != 1.0).then(|| {
             format!(
-                "{} counts in units of {own} m, and units of {metres} m are stated beside it: coordinates are taken to be in those that are stated",
+                "{} counts in units of {own} m, and units of {metres} m are stated beside it: coordinates are read in the stated ones",
                 self.name
             )
         })

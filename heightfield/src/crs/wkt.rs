@@ -213,6 +213,7 @@ impl Node {
 mod tests {
     use super::*;
 
+    /// Safety: 29.
     #[test]
     fn invalid_wkt_is_no_reference_system() {
         for text in [

@@ -129,7 +129,7 @@ impl DiskCache {
         };
         if let Err(error) = folder.write(open, name, bytes) {
             let path = folder.path.display();
-            tracing::debug!("nothing more is kept in {path}: {error}");
+            tracing::debug!("nothing more is stored in {path}: {error}");
             *size_limit = None;
         }
     }

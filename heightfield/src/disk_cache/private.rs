@@ -40,7 +40,7 @@ pub(super) fn check(folder: &Path) -> Result<()> {
             return wrong("is another user's: remove it");
         }
         if metadata.mode() & 0o022 != 0 {
-            return wrong("may be written by other users: `chmod go-w` it");
+            return wrong("is writable by other users: `chmod go-w` it");
         }
     }
     Ok(())

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime};
 const DISK_UNIT: u64 = 4096;
 /// Beginning of the name of an incomplete record.
 pub(super) const INCOMPLETE_PREFIX: &str = ".new-";
-/// Age at which an incomplete record counts as abandoned: writing never takes that long.
+/// Age at which an incomplete record counts as abandoned: writing is always faster.
 const ABANDONED_AFTER: Duration = Duration::from_secs(3600);
 
 /// Tracks the size of a folder.

@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unnamed_file_disappears_and_takes_half_the_free_space() {
+    fn unnamed_file_disappears_and_uses_half_the_free_space() {
         let folder = tempfile::tempdir().expect("a folder");
         let disk = DiskCache::at(folder.path(), 1);
         let mut first = disk.create_unnamed(1 << 20).expect("a file");
@@ -82,10 +82,10 @@ mod tests {
         }
         drop(first);
         assert_eq!(names(), 0);
-        let third = fs4::available_space(&within).expect("told") / 3;
+        let third = fs4::available_space(&within).expect("reported") / 3;
         let refused = |bytes: u64| disk.create_unnamed(bytes).err().map(|e| e.to_string());
         assert!(refused(2 * third).is_some_and(|why| why.contains("--cache")));
-        assert_eq!(refused(third), None, "nothing is left of what was refused");
+        assert_eq!(refused(third), None, "nothing is left of a refused file");
         let _one = disk.create_unnamed(third).expect("a third");
         assert!(refused(third).is_some(), "two thirds are more than half");
         let off = DiskCache::off().create_unnamed(1).err();

@@ -183,7 +183,7 @@ fn folder_writable_by_others_is_not_used() {
             let _ = fs::remove_file(path(&folder, 2));
         }
     }
-    // Only root can give a folder away.
+    // Only root can change a folder's owner.
     if std::os::unix::fs::chown(&own, Some(65_534), None).is_ok() {
         assert_eq!(cache.get(&name(1)), None, "it is another user's");
     }

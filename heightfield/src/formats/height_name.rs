@@ -1,4 +1,4 @@
-//! Choice of the variable or array in a file that holds the heights.
+//! Choice of the variable or array in a file that contains the heights.
 
 use crate::RasterError;
 

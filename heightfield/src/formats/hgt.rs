@@ -52,8 +52,8 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
             ..CellSize::stated((east, north), CellUnit::Degree, None)
         });
         decoded.remarks.push(
-            "the name does not say where the tile is (as N44W072.hgt does): it is taken to be a \
-             degree high, its cells to be square (--input cell=30m)"
+            "the name does not state the tile's place (as N44W072.hgt does): it is read as a degree \
+             high, with square cells (--input cell=30m)"
                 .into(),
         );
     }

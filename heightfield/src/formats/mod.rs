@@ -29,7 +29,7 @@ fn is_read_here(head: &[u8]) -> bool {
     FORMATS.iter().any(|format| (format.begins)(head))
 }
 
-/// Extensions of formats that GDAL reads, and whose files usually hold heights.
+/// Extensions of formats that GDAL reads, and whose files usually contain heights.
 const BY_GDAL: [&str; 9] = ["bag", "dem", "dt0", "dt1", "dt2", "grd", "img", "jp2", "nc"];
 
 /// Returns the strongest claim of any format on the extension of a file in a folder or archive.

@@ -9,7 +9,7 @@ use crate::{OpenOptions, RasterError, RawLayout};
 /// Extensions of files with samples only.
 pub(crate) const EXTENSIONS: [&str; 4] = ["raw", "bin", "r16", "r32"];
 
-/// Reads `columns × rows` samples, north row first; the file must hold exactly these.
+/// Reads `columns × rows` samples, north row first; the file must contain exactly these.
 pub(crate) fn decode(
     input: &FileBytes,
     layout: RawLayout,
@@ -17,17 +17,17 @@ pub(crate) fn decode(
 ) -> Result<Decoded, RasterError> {
     let (columns, rows) = (layout.columns, layout.rows);
     let (samples, bytes) = (u64::from(columns) * u64::from(rows), layout.sample.bytes());
-    let promised = samples
+    let stated = samples
         .checked_mul(bytes)
         .ok_or_else(|| RasterError::AbsurdSize(format!("{columns} × {rows}")))?;
     let what = format!(
-        "{columns} × {rows} samples of {bytes} bytes are {promised} bytes, the file has {}",
+        "{columns} × {rows} samples of {bytes} bytes are {stated} bytes, the file has {}",
         input.len()
     );
-    if input.len() < promised {
+    if input.len() < stated {
         return Err(RasterError::Truncated(what));
     }
-    if input.len() > promised {
+    if input.len() > stated {
         return Err(RasterError::damaged(format!(
             "the stated size is not its size: {what}"
         )));

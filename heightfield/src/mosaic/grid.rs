@@ -77,7 +77,7 @@ impl Grid {
             }
             if offset > TOLERANCE {
                 return Err(differs(format!(
-                    "its samples lie {offset:.2} cells beside the common grid"
+                    "its samples are {offset:.2} cells beside the common grid"
                 )));
             }
             at[axis] = cells.round() as i64;
@@ -165,13 +165,13 @@ fn bounds_and_step(path: &Path, file: &Decoded) -> Result<(Bounds, [f64; 2]), Ra
     let map = file
         .place
         .map(|place| place.map)
-        .ok_or_else(|| in_tile(RasterError::NoPlace("it does not say where it lies".into())))?;
+        .ok_or_else(|| in_tile(RasterError::NoPlace("it does not state its place".into())))?;
     if !map.is_straight() {
         let why = "its rows are not along its coordinates".into();
         return Err(in_tile(RasterError::NoPlace(why)));
     }
     let bounds = map.bounds((file.columns, file.rows));
-    let bounds = bounds.ok_or_else(|| in_tile(RasterError::damaged("it lies nowhere")))?;
+    let bounds = bounds.ok_or_else(|| in_tile(RasterError::damaged("its place is invalid")))?;
     let (east, north) = map.steps();
     Ok((bounds, [east, north]))
 }

@@ -151,7 +151,7 @@ impl Index {
         decoded.vertical_datum = first.vertical_datum.clone();
         let ([x, y], [east, north]) = (self.grid.corner_of(west, south), self.grid.step);
         let map = GroundMap::new([x, east, 0.0], [y, 0.0, north]);
-        let map = map.ok_or_else(|| RasterError::damaged("its files lie nowhere"))?;
+        let map = map.ok_or_else(|| RasterError::damaged("the place of its files is invalid"))?;
         decoded.set_layout(map, first.ground_unit());
         Ok(decoded)
     }

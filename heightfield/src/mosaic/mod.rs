@@ -38,8 +38,7 @@ pub(super) use names::named;
 pub(super) fn of_files(files: Vec<PathBuf>, options: &OpenOptions) -> Result<Decoded, RasterError> {
     if options.raw.is_some() {
         return Err(RasterError::NoPlace(
-            "raw samples do not say where they lie, so that many files of them are no terrain"
-                .into(),
+            "raw samples do not state their place, so several files of them are no terrain".into(),
         ));
     }
     let (files, layers) = layers::split_by_name(files);

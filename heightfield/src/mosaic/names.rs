@@ -28,7 +28,7 @@ pub(crate) fn named(path: &Path) -> Result<Option<Vec<PathBuf>>, RasterError> {
     };
     match files.len() {
         0 => Err(RasterError::NoTiles(match path.is_dir() {
-            true => "no file in this folder is known to hold a terrain and its place".into(),
+            true => "no file in this folder is a terrain file that states its place".into(),
             false => "no terrain file matches this pattern".into(),
         })),
         count if count > MAX_FILES => Err(RasterError::NoTiles(format!(
@@ -74,7 +74,7 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, RasterError> {
     Ok(files)
 }
 
-/// Returns true for names of files that hold a terrain with its place, possibly compressed.
+/// Returns true for names of files that contain a terrain with its place, possibly compressed.
 /// Pictures seldom do: beside tiles, they are previews.
 pub(super) fn is_tile(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -57,7 +57,7 @@ impl Mosaic {
                 name.to_string_lossy().into_owned()
             });
             format!(
-                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is taken",
+                "{one} and {other} overlap and differ there by up to {} ({} of {} places compared): {other} is used",
                 it.max_difference, it.different, it.compared
             )
         })

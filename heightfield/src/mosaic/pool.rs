@@ -205,6 +205,7 @@ mod tests {
     use super::*;
     use crate::blocks::Part;
 
+    /// Safety: 29.
     #[test]
     fn opening_is_abandoned_after_its_timeout() {
         let source = Source {

@@ -53,7 +53,7 @@ pub(super) fn at_opening(error: &StoreError) -> Error {
     };
     if METADATA_PATHS.iter().any(|part| text.contains(part)) {
         return invalid(
-            "the environment holds no key, and this computer has none of its own".into(),
+            "the environment contains no key, and this computer has none of its own".into(),
         );
     }
     let is_refused = ["400", "401", "403"]
@@ -100,13 +100,13 @@ pub(super) fn reported(error: &StoreError) -> Error {
         // Microsoft's servers also respond so for archived files, and others for files that are
         // being changed. The library interprets it as an error of a write.
         StoreError::AlreadyExists { .. } => {
-            let why = "its server does not hand it out";
+            let why = "its server does not provide it";
             return Error::new(ErrorKind::Unsupported, with_code(why, error));
         }
         _ if has_status(error, "400") && code(&error.to_string()).is_some() => {
             let why = match error {
-                StoreError::Generic { store: "HTTP", .. } => "the server does not take the URL",
-                _ => "the server does not take what the environment says",
+                StoreError::Generic { store: "HTTP", .. } => "the server rejects the URL",
+                _ => "the server rejects the settings of the environment",
             };
             return Error::new(ErrorKind::InvalidInput, with_code(why, error));
         }
@@ -126,7 +126,7 @@ fn redirect_error(error: &StoreError) -> Option<&RedirectError> {
 }
 
 fn forbidden(error: &StoreError) -> Error {
-    let why = "it may not be read without a key that opens it";
+    let why = "reading it requires a key";
     Error::new(ErrorKind::PermissionDenied, with_code(why, error))
 }
 
@@ -138,7 +138,7 @@ fn has_status(error: &StoreError, status: &str) -> bool {
 
 fn with_code(why: &str, error: &StoreError) -> String {
     match code(&error.to_string()) {
-        Some(code) => format!("{why}: the server says {code}"),
+        Some(code) => format!("{why}: the server reports {code}"),
         None => why.into(),
     }
 }
@@ -219,7 +219,7 @@ mod tests {
         for (text, why) in [
             (
                 "Error performing PUT http://169.254.169.254/latest/api/token in 1s",
-                "holds no key",
+                "contains no key",
             ),
             (
                 "Received redirect without LOCATION, this normally indicates an incorrectly configured region",
@@ -242,7 +242,7 @@ mod tests {
         };
         let expired = response("<Error><Code>ExpiredToken</Code></Error>");
         assert!(
-            expired.ends_with("the server says ExpiredToken"),
+            expired.ends_with("the server reports ExpiredToken"),
             "{expired}"
         );
         let page = response("<Code>see https://h?sig=secret</Code>");

@@ -239,10 +239,10 @@ impl RemoteFile {
             // This state is final.
             (Some(FileFault::Lost(_)), _) => return,
             (None, FileFault::Outage(..)) if is_logged => tracing::warn!(
-                "{name} cannot be read at present; what was read stays, the rest is asked for again and again: {why}"
+                "{name} cannot be read at present; samples already read stay, the rest is retried: {why}"
             ),
             (_, FileFault::Lost(_)) if is_logged => {
-                tracing::warn!("{name} is not read on; what was read stays: {why}");
+                tracing::warn!("{name} is not read further; samples already read stay: {why}");
             }
             _ => {}
         }

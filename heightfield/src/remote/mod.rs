@@ -68,7 +68,7 @@ pub(crate) fn is_lost(error: &Error) -> bool {
     error.kind() == LOST
 }
 
-/// Returns the error for missing bytes whose reason is no longer known.
+/// Returns the error for missing bytes whose reason is no longer stored.
 pub(crate) fn outage() -> Error {
     Error::new(OUTAGE, "it was not received: try again")
 }

@@ -111,10 +111,7 @@ mod tests {
         let mut pages = Pages::default();
         assert_eq!(pages.take_missing(1, 3..5), one(3..5));
         assert_eq!(pages.take_missing(1, 0..22), [0..3, 5..21, 21..22]);
-        assert!(
-            pages.take_missing(1, 0..22).is_empty(),
-            "all are on their way"
-        );
+        assert!(pages.take_missing(1, 0..22).is_empty(), "all are requested");
         pages.failed(1, 5..21);
         assert_eq!(pages.take_missing(1, 4..7), one(5..7));
         pages.insert(1, 3..5, &vec![7; PAGE as usize + 1]);

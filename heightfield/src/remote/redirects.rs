@@ -24,10 +24,10 @@ pub(super) enum RedirectError {
     )]
     LeavesHttps(String),
     #[error(
-        "its server redirects to {0}, and the key of the request is for another host: name its URL there if that is meant"
+        "its server redirects to {0}, and the key of the request is for another host: name its URL there if that is intended"
     )]
     SendsKey(String),
-    #[error("its server redirects to what is no URL of a web server")]
+    #[error("its server redirects to a target that is no URL of a web server")]
     NotAUrl,
     #[error("its server redirects again and again")]
     TooMany,

@@ -110,8 +110,7 @@ fn connect(url: &str) -> Result<Server> {
             std::convert::identity
         ),
         other => {
-            let why =
-                format!("no files are read by {other}://: https, http, s3, gs and az are known");
+            let why = format!("{other}:// is not supported: use https, http, s3, gs or az");
             return Err(Error::new(ErrorKind::Unsupported, why));
         }
     })

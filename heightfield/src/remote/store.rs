@@ -67,7 +67,7 @@ async fn whole(url: &str, store: Arc<dyn ObjectStore>, path: Path) -> Result<Ope
     let metadata = response.meta.clone();
     if metadata.size > MAX {
         let why = format!(
-            "the server hands out no parts of files, and this one has {} MB",
+            "the server does not serve parts of files, and this one has {} MB",
             metadata.size >> 20
         );
         return Err(Error::new(ErrorKind::Unsupported, why));
@@ -136,14 +136,14 @@ async fn body(response: GetResult, range: &Range<u64>) -> Result<Vec<u8>> {
     while let Some(part) = parts.next().await {
         bytes.extend_from_slice(&part.map_err(|error| reported(&error))?);
         if bytes.len() as u64 > expected {
-            let why = format!("more than {expected} bytes came");
+            let why = format!("more than {expected} bytes arrived");
             return Err(Error::new(OUTAGE, why));
         }
     }
     match bytes.len() as u64 == expected {
         true => Ok(bytes),
         false => {
-            let why = format!("{} bytes of {expected} came", bytes.len());
+            let why = format!("{} bytes of {expected} arrived", bytes.len());
             Err(Error::new(OUTAGE, why))
         }
     }

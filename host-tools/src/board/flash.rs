@@ -31,7 +31,7 @@ pub struct Progress {
 #[derive(Debug, thiserror::Error)]
 pub enum FlashError {
     /// probe-rs has no entry for the chip.
-    #[error("the chip {0} is not known")]
+    #[error("probe-rs does not support the chip {0}")]
     UnknownChip(&'static str, #[source] RegistryError),
     /// The board has no chip.
     #[error("{0} is emulated: there is no chip to write to")]
@@ -57,7 +57,7 @@ pub enum FlashError {
     #[error("{0} does not name a probe")]
     Selector(String),
     /// The probe cannot be opened.
-    #[error("the debug probe {name} does not open")]
+    #[error("the debug probe {name} cannot be opened")]
     Probe {
         /// The probe.
         name: String,
@@ -77,7 +77,7 @@ pub enum FlashError {
         source: Box<probe_rs::Error>,
     },
     /// The chip refused the image.
-    #[error("{chip} did not take the image")]
+    #[error("the image cannot be written to {chip}")]
     Write {
         /// The chip.
         chip: String,

@@ -103,13 +103,13 @@ impl fmt::Display for Task {
             }
             Self::ConnectReadyWire(axis) => write!(f, "connect ready wire {} again", axis + 1),
             Self::PressDeadMan => f.write_str("press the dead-man switch and hold it"),
-            Self::ReleaseDeadMan => f.write_str("let the dead-man switch go"),
+            Self::ReleaseDeadMan => f.write_str("release the dead-man switch"),
             Self::ZeroPose => f.write_str(
                 "put the arm into its zero pose and hold it: upper link level and pointing at you, fore link hanging straight down",
             ),
             Self::MoveAlong(direction, mm) => write!(
                 f,
-                "lay a ruler at the tip; move the tip {} by about {mm} mm and hold it",
+                "place a ruler at the tip; move the tip {} by about {mm} mm and hold it",
                 direction.words()
             ),
             Self::HoldLoosely => f.write_str(
@@ -121,7 +121,7 @@ impl fmt::Display for Task {
                 against(*axis)
             ),
             Self::ReadScale => f.write_str("read the scale now"),
-            Self::ReleaseTip => f.write_str("let the tip go, a hand near it; keep the switch pressed"),
+            Self::ReleaseTip => f.write_str("release the tip, a hand near it; keep the switch pressed"),
             Self::HoldTip => f.write_str("hold the tip again"),
             Self::LowerTip => f.write_str(
                 "lower the tip slowly: a soft floor begins some 20 mm below; push 10 mm into it",
@@ -196,7 +196,7 @@ impl fmt::Display for Reading {
                 100.0 * fraction
             ),
             Self::MovedMm(direction, _) => {
-                write!(f, "how many mm did the tip go {}?", direction.words())
+                write!(f, "how many mm did the tip move {}?", direction.words())
             }
             Self::ScaleGrams { pushed: false } => f.write_str("grams on the scale, at rest?"),
             Self::ScaleGrams { pushed: true } => {

@@ -17,7 +17,7 @@ pub enum Finding {
     NotReady(Blockers),
     /// The board's tick rate differs by another clock.
     #[error(
-        "the board ticks {hz:.0} times a second by this computer's clock where it says {nominal_hz:.0}"
+        "the board runs at {hz:.0} ticks a second by this computer's clock, and reports {nominal_hz:.0}"
     )]
     WrongTickRate {
         /// The counted rate.
@@ -32,7 +32,7 @@ pub enum Finding {
     #[error("the board refuses: {0}")]
     Refused(Refusal),
     /// The user's action was not detected.
-    #[error("the board did not see it: {0}")]
+    #[error("the board did not detect it: {0}")]
     NotDetected(Task),
     /// The enable line is not low.
     #[error("the enable line is at {0:.2} V where it has to be low")]
@@ -50,7 +50,7 @@ pub enum Finding {
         unit: &'static str,
     },
     /// An encoder did not count while its joint turned.
-    #[error("the encoder of joint {joint} is dead: it went {counts} counts while the joint turned")]
+    #[error("the encoder of joint {joint} is dead: {counts} counts while the joint turned")]
     DeadEncoder {
         /// The joint.
         joint: usize,
@@ -76,14 +76,14 @@ pub enum Finding {
         back: i32,
     },
     /// The board has no calibration record.
-    #[error("the board holds no stored calibration")]
+    #[error("the board has no stored calibration")]
     NoCalibration,
     /// The distances by the ruler fit no record.
     #[error(transparent)]
     Ruler(#[from] FitError),
     /// An encoder's direction differs from the record's.
     #[error(
-        "the encoder sign of joint {joint} is inverted: the record says {record:+}, the ruler the opposite"
+        "the encoder sign of joint {joint} is inverted: {record:+} in the record, the opposite by the ruler"
     )]
     InvertedEncoder {
         /// The joint.
@@ -113,7 +113,7 @@ pub enum Finding {
     },
     /// A motor turned its joint in the wrong direction.
     #[error(
-        "the sign of motor {motor} is inverted: it turns its joint the other way than the record says"
+        "the sign of motor {motor} is inverted: it turns its joint against the direction in the record"
     )]
     InvertedMotor {
         /// The motor.
@@ -138,7 +138,9 @@ pub enum Finding {
         motor: usize,
     },
     /// A motor's torque is far from the record's.
-    #[error("motor {motor} makes {found:.4} Nm for an ampere where the record says {record:.4}")]
+    #[error(
+        "the torque constant of motor {motor} is wrong: {record:.4} Nm/A in the record, {found:.4} by the scale"
+    )]
     WrongTorque {
         /// The motor.
         motor: usize,
@@ -148,7 +150,7 @@ pub enum Finding {
         record: f64,
     },
     /// The arm drifts after its release.
-    #[error("the arm drifts: {mm:.0} mm within {seconds:.1} s after it was let go")]
+    #[error("the arm drifts: {mm:.0} mm within {seconds:.1} s after its release")]
     Drifts {
         /// Distance, mm.
         mm: f64,
@@ -156,7 +158,7 @@ pub enum Finding {
         seconds: f64,
     },
     /// The arm moves fast after its release.
-    #[error("the arm moves by itself: its tip had {mm_s:.0} mm/s when it was let go")]
+    #[error("the arm moves by itself: its tip moved at {mm_s:.0} mm/s at its release")]
     MovesByItself {
         /// Speed, mm/s.
         mm_s: f64,
@@ -184,14 +186,14 @@ impl Finding {
                 "check the amplifier's full scale against the board's page, then the torque constant of the motor's data sheet"
             }
             Self::NotReady(_) | Self::Refused(_) => "look at hapterra status",
-            Self::WrongTickRate { .. } => "do not go on: every limit in seconds would be wrong; flash the image of this very board again, and report it if it stays so",
+            Self::WrongTickRate { .. } => "do not continue: every limit in seconds would be wrong; flash the image of this very board again, and report it if it stays so",
             Self::UsbClockUnlocked => "try another USB port without a hub; if it stays so, report it with the board's name and revision",
             Self::NotDetected(Task::PullReadyWire(_) | Task::ConnectReadyWire(_)) => {
                 "check that the amplifier is there, that its logic has power, and that its ready output is low while it is ready; an input that is tied to ground belongs to an amplifier without such an output"
             }
             Self::NotDetected(_) => "check the switch's wires against the board's page",
-            Self::EnableHigh(_) => "add the pull-down at the amplifiers; go no further before it is low",
-            Self::Output { .. } => "check the output's wire and its offset stage, which gets 1.65 V for no current from a G474; no amplifier is switched on before it is right",
+            Self::EnableHigh(_) => "add the pull-down at the amplifiers; do not continue until it is low",
+            Self::Output { .. } => "check the output's wire and its offset stage, which gets 1.65 V for no current from a G474; switch no amplifier on until it is right",
             Self::DeadEncoder { .. } => "check the encoder's supply, both its channels, and its plug",
             Self::SwappedEncoders { .. } => "exchange the two encoders' wires",
             Self::CountsLost { .. } => "check the encoder's level shifter, its shield and its ground",
@@ -205,8 +207,8 @@ impl Finding {
                 "hold the tip more loosely and as still as you can, and try again; if it stays so, a current may flow without a command: measure the command at the amplifier again (--again-from outputs)"
             }
             Self::Drifts { .. } | Self::MovesByItself { .. } => "measure the arm's weight again: hapterra calibrate --measure zero,gravity",
-            Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not to be relied on",
-            Self::NoFloor => "report it with the log; do not go on to terrain",
+            Self::StopLeavesPower => "wire the stop's second contact into the supply of the power stages; the board alone is not sufficient",
+            Self::NoFloor => "report it with the log; do not continue with terrain",
         }
         .into()
     }

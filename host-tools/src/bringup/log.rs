@@ -190,11 +190,11 @@ impl Log {
         let of = |it: &Identity| (it.board.clone(), it.serial.clone(), it.firmware.clone());
         let why = if (of(&was), was.tick_hz) != (of(now), now.tick_hz) {
             self.entries.clear();
-            "the board or its firmware is another one"
+            "the board or its firmware has changed"
         } else if was.calibration != now.calibration {
             self.entries
                 .retain(|entry| !entry.step.depends_on_calibration());
-            "the calibration is another one"
+            "the calibration has changed"
         } else {
             return None;
         };

@@ -11,7 +11,7 @@
 //! while no joint may move faster than
 //! [`MAX_JOG_SPEED_RAD_S`](hapterra_core::guard::MAX_JOG_SPEED_RAD_S) or farther than
 //! [`MAX_JOG_ROTATION_RAD`](hapterra_core::guard::MAX_JOG_ROTATION_RAD). No surface is rendered
-//! before each motor's joint, sign and torque are known.
+//! before each motor's joint, sign and torque are verified.
 
 mod attendant;
 mod board;

@@ -50,7 +50,7 @@ pub fn run_sequence(
     let mut board = Board::new(control, attendant.stop_check());
     let record = board.calibration().map_err(BringupError::Halt)?;
     if let Some(why) = log.update_identity(Identity::of(board.device(), record.as_ref())) {
-        attendant.notify(&format!("{why}: what was found of it no longer counts"));
+        attendant.notify(&format!("{why}: its earlier results are discarded"));
     }
     while let Some(step) = log.next() {
         let (number, of, title) = (step.number(), Step::ALL.len(), step.title());

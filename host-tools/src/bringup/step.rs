@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A step. Each is gone through only when all before it are passed.
+/// A step. It runs only after all steps before it have passed.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
 )]
@@ -12,7 +12,7 @@ pub enum Step {
     Board,
     /// Emergency stop and dead-man switch, each in both positions.
     Switches,
-    /// The ready lines are seen; the enable line is low, whatever becomes of the board.
+    /// The ready lines are detected; the enable line is low in every state of the board.
     EnableLine,
     /// The command outputs follow, with the amplifiers off.
     Outputs,
@@ -20,7 +20,7 @@ pub enum Step {
     Encoders,
     /// The record's ratios and signs are the arm's.
     Calibration,
-    /// Motor 1 turns joint 1, the right way, as strongly as the record says.
+    /// Motor 1 turns joint 1 in the direction and with the torque of the record.
     #[serde(rename = "motor-1")]
     #[value(name = "motor-1")]
     Motor1,

@@ -56,7 +56,7 @@ enum Fault {
     Format(u32),
     #[error("no model is called {0}")]
     Model(String),
-    #[error("the calibration does not make sense: {0}")]
+    #[error("the calibration is not valid: {0}")]
     Invalid(CalibrationError),
     #[error("a binary record of an earlier version, but {0}")]
     Binary(RecordError),
@@ -260,7 +260,7 @@ l2_mm = {l2:?}
 min_rad = {min}
 # Largest joint angles: {max_deg}.
 max_rad = {max}
-# What the parallel linkage allows between joints 2 and 3: {spread_deg}.
+# Limits of the parallel linkage between joints 2 and 3: {spread_deg}.
 q2_minus_q3_max_rad = {q23:?}
 q3_minus_q2_max_rad = {q32:?}
 
@@ -275,7 +275,7 @@ sign = {motor_sign}
 torque_constant_nm_per_a = {torque}
 # Largest current of a cool motor.
 peak_a = {peak}
-# Current that a motor bears for ever.
+# Current that a motor can carry continuously.
 continuous_a = {continuous}
 
 [thermal]
@@ -289,7 +289,7 @@ housing_s = {housing_s:?}
 [limits]
 # Largest force at the tip.
 max_force_n = {force:?}
-# Speed of the tip from which force is reduced; at twice this speed nothing is left.
+# Speed of the tip from which force is reduced; at twice this speed it is zero.
 max_speed_mm_s = {speed:?}
 ",
         program = env!("CARGO_PKG_VERSION"),
@@ -369,10 +369,10 @@ mod tests {
         for (from, to, expected) in [
             ("calibration = 1", "calibration = 2", "format 2"),
             ("premium-1.5", "premium-9", "no model is called premium-9"),
-            ("l1_mm = 209.55", "l1_mm = 1.0", "does not make sense"),
+            ("l1_mm = 209.55", "l1_mm = 1.0", "is not valid"),
             ("l1_mm", "l1_inch", "l1_inch"),
             ("l1_mm = 209.55\n", "", "l1_mm"),
-            ("l1_mm = 209.55", "l1_mm = nan", "does not make sense"),
+            ("l1_mm = 209.55", "l1_mm = nan", "is not valid"),
             ("[links]", "[links", "no calibration file"),
         ] {
             let message = message(&good.replacen(from, to, 1));

@@ -1,11 +1,11 @@
-//! Reason why measurements give no record.
+//! Reason why the measurements yield no record.
 
-/// Reason why measurements give no record.
+/// Reason why the measurements yield no record.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A joint moved too little in all checks.
     #[error(
-        "joint {joint} moved by no more than {counts} counts in all checks: too little to tell its ratio"
+        "joint {joint} moved by no more than {counts} counts in all checks: too little to determine its ratio"
     )]
     NotMoved {
         /// The joint, 1 to 3.

@@ -8,7 +8,7 @@
 //! scale     ─▶ newtons ───▶ gravity (gravity.rs) ──────┘
 //! ```
 //!
-//! The motors stay off throughout, so that an error in a record cannot hurt the user during the
+//! The motors stay off throughout, so that an error in a record cannot injure the user during the
 //! measurement. [`run_procedure`] runs the steps; the [`Attendant`] that answers is a terminal or a
 //! [`VirtualUser`].
 

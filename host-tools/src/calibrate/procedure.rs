@@ -52,7 +52,7 @@ pub trait Attendant {
 #[error("stopped: nothing was changed on the device")]
 pub struct Stopped;
 
-/// Reason why a calibration gives no record.
+/// Reason why a calibration ends without a record.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcedureError<E: std::error::Error + 'static> {
     /// The attendant stopped.
@@ -65,7 +65,7 @@ pub enum ProcedureError<E: std::error::Error + 'static> {
     #[error(transparent)]
     Counts(E),
     /// The attendant did not accept the record.
-    #[error("the record was not agreed to: nothing was changed on the device")]
+    #[error("the record was not accepted: nothing was changed on the device")]
     Refused,
 }
 

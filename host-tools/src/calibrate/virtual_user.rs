@@ -1,4 +1,4 @@
-//! A simulated user with a Phantom whose true numbers are known.
+//! A simulated user with a Phantom of known parameters.
 
 use std::cell::Cell;
 use std::rc::Rc;

@@ -29,9 +29,9 @@ pub struct Args {
     #[arg(short, long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
 
-    /// Largest number of samples; the finest level within it is written
+    /// Maximum number of samples: the finest level within it is written
     #[arg(long, value_name = "N", default_value_t = 4_000_000, value_parser = clap::value_parser!(u64).range(1024..))]
-    pub most_samples: u64,
+    pub max_samples: u64,
 }
 
 /// Description of the heights; its fields have the names of the JSON.
@@ -61,8 +61,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let grid = HapticGrid::new(&raster, args.terrain.reading.cells());
     let of = [grid.columns(), grid.rows()];
     let size = |level: u8| of.map(|count| ((count - 1) >> level) + 1);
-    let fits =
-        |level: &u8| size(*level).map(u64::from).iter().product::<u64>() <= args.most_samples;
+    let fits = |level: &u8| size(*level).map(u64::from).iter().product::<u64>() <= args.max_samples;
     let level = (0..31).find(fits).unwrap_or(31);
     let about = About {
         file: HEIGHTS,

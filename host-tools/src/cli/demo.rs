@@ -326,7 +326,7 @@ fn tour_emulated<'t>(
                 // The arm must run until the board has reduced its force to zero.
                 let ended = emulator.finish().map(|()| tour_result);
                 ended
-                    .map_err(|why| format!("the emulated board did not end well: {why}"))
+                    .map_err(|why| format!("the emulated board ended with an error: {why}"))
                     .or_hint(report)
             }
             // The user ended the tour, and the board may not have been able to reply.
@@ -372,7 +372,7 @@ impl<'t> Tour<'_, 't> {
         let notify = |line: String| writer::write_text(std::io::stderr(), &(line + "\n"));
         let mut viewer = self.viewer.and_then(|viewer| viewer.start(&device, notify));
         let stop_tick = (self.stop_s * f64::from(device.tick_hz)).ceil() as u64;
-        let template = "feeling {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
+        let template = "rendering {bar:30} {human_pos} of {human_len} ticks, {elapsed}";
         let progress = progress::bar(Some(stop_tick), template);
         let (mut log, mut rows) = (SampleLog::new(terrain, &device), Vec::new());
         let mut marks = Vec::new();
@@ -405,7 +405,7 @@ impl<'t> Tour<'_, 't> {
             };
             control.update(log.t_s(), &mut |text| refuse(text));
             if control.entered().is_some() {
-                refuse("a virtual arm has asked nothing that `enter` answers".into());
+                refuse("a virtual arm has no open question for `enter`".into());
             }
             for mark in control.marks(&log, false) {
                 print_line(steering::mark_text(&mark));

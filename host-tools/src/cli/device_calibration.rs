@@ -7,7 +7,7 @@ use super::failure::{Failure, OrHint};
 use crate::calibrate::file;
 use crate::link::{ControlSession, DeviceAddress, HostClock, Native};
 
-/// Reads a device's calibration without taking it from its host. If it has none, returns its
+/// Reads a device's calibration; a session of another host continues. If it has none, returns its
 /// model's preset, with a message.
 ///
 /// # Errors

@@ -99,12 +99,14 @@ fn image(args: &Args) -> Result<PathBuf, Failure> {
     let checkout = Checkout::own()
         .ok_or_else(|| {
             let board = args.board.name;
-            format!("no image of {board}: the source that this program was built from is gone")
+            format!(
+                "no image of {board}: the source that this program was built from no longer exists"
+            )
         })
-        .or_hint("name one with --image ELF, or build this program anew in a checkout")?;
+        .or_hint("name one with --image ELF, or rebuild this program in a checkout")?;
     println!("source         {}", checkout.root().display());
     let built = checkout.build(args.board);
-    built.or_hint("the messages of cargo above say why")
+    built.or_hint("see the messages of cargo above")
 }
 
 /// Returns the failure of a build without support for probes.

@@ -52,7 +52,7 @@ impl Hint for GroundError {
     fn hint(&self) -> String {
         match self {
             Self::NoSystem { unplaced, .. } => {
-                format!("give it one: gdal_translate -a_srs EPSG:CODE {unplaced} OUT.tif")
+                format!("assign one: gdal_translate -a_srs EPSG:CODE {unplaced} OUT.tif")
             }
             Self::NoConversion { .. } => {
                 "bring the classes into the terrain's reference system: gdalwarp -t_srs EPSG:CODE -r near IN OUT.tif"
@@ -83,10 +83,10 @@ impl Hint for PlaceError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoSystem { .. } => {
-                "give the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or give the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
+                "state the place in the file's own coordinates with --at X,Y or --bbox W,S,E,N, or assign the file its reference system: gdal_translate -a_srs EPSG:CODE IN OUT.tif"
             }
             Self::NotOnMap { .. } | Self::BoxAcrossSeam { .. } | Self::NoProjection { .. } => {
-                "say the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
+                "state the place in the file's own coordinates, with --at X,Y or --bbox W,S,E,N, or bring the file into longitude and latitude, its edges as no data: gdalwarp -t_srs EPSG:4326 -r bilinear -ot Float32 -dstnodata -9999 IN OUT.tif"
             }
             Self::Outside { .. } | Self::NoData { .. } => {
                 "choose a place inside: longitude (or x) comes first"
@@ -96,9 +96,9 @@ impl Hint for PlaceError {
                 "choose a box that overlaps it: west, south, east, north"
             }
             Self::UnknownCode(_) => {
-                "give the place with --crs file or --crs lonlat, or install GDAL, which knows more codes"
+                "state the place with --crs file or --crs lonlat, or install GDAL, which supports more codes"
             }
-            Self::OtherDatum { .. } => "say the place in the file's own coordinates: --crs file",
+            Self::OtherDatum { .. } => "state the place in the file's own coordinates: --crs file",
             Self::NotInSystem { .. } => "choose a place inside: x, to the east, comes first",
             Self::LatitudeFirst([latitude, longitude]) => {
                 return format!("swap them: --at {longitude},{latitude} --crs lonlat");
@@ -107,7 +107,7 @@ impl Hint for PlaceError {
                 return format!("swap them: --bbox {east},{south},{west},{north} --crs lonlat");
             }
             Self::NoBox(_) => {
-                "give west before east and south before north; only a box of degrees may cross 180°"
+                "state west before east and south before north; only a box of degrees may cross 180°"
             }
             Self::BoxInTwoParts { .. } => "name one of both parts, or --at a place",
             Self::BoxTooSmall { .. } => "choose a larger box",
@@ -146,17 +146,17 @@ impl Hint for ReplayError {
         let hint = match self {
             Self::Link(error) => return error.hint(),
             Self::Trajectory(error) if error.is_about_settings() => {
-                "replay it with the version of hapterra that recorded it, or take its path alone with --ignore-settings"
+                "replay it with the version of hapterra that recorded it, or replay its path alone with --ignore-settings"
             }
             Self::Trajectory(error) if error.is_about_time() => {
-                "t_s is in seconds and goes forward row by row, in a recording by whole ticks; --rows-are-ticks takes each row as one tick, whatever t_s says"
+                "t_s is in seconds and increases from row to row, in a recording by whole ticks; --rows-are-ticks replays each row as one tick and ignores t_s"
             }
             Self::Trajectory(_) => {
                 "a trajectory is CSV: the header t_s,x_mm,y_mm,z_mm, then four numbers a line"
             }
             Self::Output(_) => "name a file in a folder that you may write to with -o",
             Self::Placement { .. } => {
-                "replay it on the terrain that it was recorded on; --ignore-settings takes its path alone"
+                "replay it on the terrain that it was recorded on; --ignore-settings replays its path alone"
             }
             Self::Interrupted => "nothing was written",
         };
@@ -166,7 +166,7 @@ impl Hint for ReplayError {
 
 impl Hint for OtherTerrain {
     fn hint(&self) -> String {
-        "name the terrain file of the recording, with the same options; or take the recording's path alone, on this terrain, with --ignore-settings".into()
+        "name the terrain file of the recording, with the same options; or replay the recording's path alone, on this terrain, with --ignore-settings".into()
     }
 }
 
@@ -200,13 +200,13 @@ impl Hint for EmulatorError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::NoImage | Self::Image { .. } => {
-                "`cargo xtask demo` builds the image and names it; or say --device emulated:ELF"
+                "`cargo xtask demo` builds the image and names it; or name it with --device emulated:ELF"
             }
             Self::Qemu { .. } => {
                 "install QEMU for ARM (`cargo xtask demo` does, or type: sudo apt-get install qemu-system-arm), or name it in HAPTERRA_QEMU"
             }
             Self::NotUp { .. } => {
-                "check that the image is the mps2-an386 one: `cargo xtask demo` builds it anew"
+                "check that the image is the mps2-an386 one: `cargo xtask demo` rebuilds it"
             }
             Self::Listen(_) => "check that this program may open sockets on 127.0.0.1",
         };
@@ -222,7 +222,7 @@ impl Hint for ProcedureError<LinkError> {
                 "move the tip by 80 mm or so in each direction; if you did, check that joint's encoder cable"
             }
             Self::Fit(FitError::NoRatios { .. }) => {
-                "measure again, along the ruler and in the direction asked for; check the link lengths with --set l1-mm=… and --set l2-mm=…"
+                "measure again, along the ruler and in the requested direction; check the link lengths with --set l1=… and --set l2=…"
             }
             Self::Fit(FitError::NoWeight { .. }) => {
                 "hold the arm in more different poses, or leave gravity out with --measure zero,ratios"
@@ -267,7 +267,7 @@ impl Hint for UpdateError {
     fn hint(&self) -> String {
         let hint = match self {
             Self::Nothing { .. } => {
-                "plug the board's own USB in; `hapterra list` shows what is seen; a board without working firmware shows its loader when BOOT0 is high at a reset"
+                "plug the board's own USB in; `hapterra list` shows the devices that are found; a board without working firmware shows its loader when BOOT0 is high at a reset"
             }
             Self::Several(_) => {
                 "name one: --device usb:SERIAL; if two have the same serial number, unplug one"
@@ -298,7 +298,7 @@ impl Hint for UpdateFailure {
         if !self.erased {
             return format!("{}; nothing was erased", self.error.hint());
         }
-        "the board has no whole program now, and its calibration is as it was; leave the power stages off and type the same command again, the loader is still there; if it is not: unplug everything, set BOOT0 high (NUCLEO-G474RE: CN7 pin 7 to pin 5; NUCLEO-H743ZI2: CN11 pin 7 to pin 5), plug in, and type it again; or use the debug probe: hapterra flash without --dfu".into()
+        "the board has no complete program now, and its calibration is unchanged; leave the power stages off and type the same command again, the loader is still there; if it is not: unplug everything, set BOOT0 high (NUCLEO-G474RE: CN7 pin 7 to pin 5; NUCLEO-H743ZI2: CN11 pin 7 to pin 5), plug in, and type it again; or use the debug probe: hapterra flash without --dfu".into()
     }
 }
 
@@ -312,7 +312,7 @@ mod of_the_probe {
             let hint = match self {
                 Self::UnknownChip(..) | Self::Emulated(_) => super::REPORT,
                 Self::NoProbe => {
-                    "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows what is seen"
+                    "plug the Nucleo's ST-LINK connector in with a data cable; `hapterra list` shows the devices that are found"
                 }
                 Self::NoSuchProbe { .. } | Self::ManyProbes(_) | Self::Selector(_) => {
                     "name one as --probe VID:PID:SERIAL"

@@ -17,6 +17,7 @@ use super::options::placing::off_in_words;
 use super::options::terrain_file::{ReadingOptions, TerrainFile};
 use super::report::put;
 use crate::place::place_in_words;
+use crate::quantity::DATA_RATE;
 use crate::terrain::{Distortion, HapticGrid};
 use heightfield::printable_text::printable_json;
 use heightfield::without_key;
@@ -39,10 +40,10 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["file", "link", "json"])]
     pub formats: bool,
 
-    /// Show how fast a link of this many MB/s carries the tiles [1 without a number]
+    /// Show how fast a link of this rate, such as 200kB/s, carries the tiles [without a rate: 1MB/s]
     ///
     /// Bytes of a tile, tiles a second, and the cells a second that the HIP may move along an axis.
-    #[arg(long, value_name = "MB_PER_S", num_args = 0..=1, default_missing_value = "1", value_parser = rate)]
+    #[arg(long, value_name = "RATE", num_args = 0..=1, default_missing_value = "1MB/s", value_parser = rate)]
     pub link: Option<f64>,
 
     /// Print one JSON object
@@ -50,12 +51,11 @@ pub struct Args {
     pub json: bool,
 }
 
-/// Parses a rate of the link.
+/// Parses a rate of the link, MB/s.
 fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
-        _ => Err("megabytes a second above zero, as 1 or 0.5".into()),
-    }
+    let rate = DATA_RATE.read(text)?;
+    let is_above_zero = (rate > 0.0).then_some(rate);
+    is_above_zero.ok_or_else(|| "a rate of the link is above zero, such as 200kB/s".into())
 }
 
 /// Shows the file's content.
@@ -245,7 +245,7 @@ impl FileReport {
             "lon/lat",
             match (&self.bounds_lonlat, self.projection_known) {
                 (None, false) => {
-                    "unknown: the projection of its reference system is not known here".into()
+                    "unknown: the projection of its reference system is not supported".into()
                 }
                 (bounds, _) => edges(bounds),
             },

@@ -12,7 +12,9 @@ use std::time::Instant;
 use tracing::Metadata;
 use tracing::callsite::Identifier;
 use tracing_subscriber::EnvFilter;
-use tracing_subscriber::fmt::MakeWriter;
+use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::fmt::format::{DefaultFields, Format, Full};
+use tracing_subscriber::fmt::{MakeWriter, SubscriberBuilder};
 
 use super::line_limit::LineLimit;
 use super::terminal::writer;
@@ -33,16 +35,24 @@ pub(super) fn to_stderr(verbose: u8) -> Log<StderrLines> {
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let log = Log::to(|| StderrLines);
+    subscriber(log.clone()).with_env_filter(filter).init();
+    log
+}
+
+/// A subscriber with the format of this log.
+type Subscriber<W> = SubscriberBuilder<DefaultFields, Format<Full, ()>, LevelFilter, Log<W>>;
+
+/// Returns the builder of the subscriber that writes to `log`.
+fn subscriber<W: Write + 'static>(log: Log<W>) -> Subscriber<W> {
     tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(log.clone())
+        .with_writer(log)
         // Colours are control sequences, which no line may contain.
         .with_ansi(false)
         .without_time()
+        // Module paths are internal names.
+        .with_target(false)
         // If standard error is closed, there is no reader.
         .log_internal_errors(false)
-        .init();
-    log
 }
 
 /// Sends lines to the thread that writes to standard error. The logging thread, perhaps with an
@@ -141,7 +151,8 @@ impl<W: Write> Write for Line<W> {
                 line += &omitted_text(omitted);
             }
             line.push('\n');
-            // A write error is ignored: its report would go to standard error too, and would panic.
+            // A write error is ignored: its report on standard error would fail as well, and would
+            // panic.
             let _ = out.write_all(line.as_bytes());
         }
         Ok(bytes.len())
@@ -182,14 +193,16 @@ mod tests {
         let page = Page::default();
         let copy = page.clone();
         let log = Log::to(move || copy.clone());
-        let subscriber = tracing_subscriber::fmt()
-            .with_writer(log.clone())
-            .with_ansi(false)
-            .without_time()
-            .finish();
+        let subscriber = subscriber(log.clone()).finish();
         tracing::subscriber::with_default(subscriber, log_lines);
         log.end();
         page.text()
+    }
+
+    #[test]
+    fn log_line_has_level_and_message_without_module_path() {
+        let text = log_of(|| tracing::warn!(stiffness = 2.0, "above the limit"));
+        assert_eq!(text, " WARN above the limit stiffness=2.0\n");
     }
 
     #[test]

@@ -4,8 +4,8 @@
 //! - [`options`]: options that several subcommands share;
 //! - [`terminal`]: progress, Ctrl-C, and prompts while a command runs;
 //! - [`failure`] and `hints`: error messages and their remedies;
-//! - `guardian`: the process that disarms the arm if the serving process dies; `worker_pipe`: what
-//!   the serving process reports to it;
+//! - `guardian`: the process that disarms the arm if the serving process ends abruptly;
+//!   `worker_pipe`: the serving process's reports to it;
 //! - [`report`]: the result that a command prints;
 //! - `settings`: settings files and recordings in place of options;
 //! - `old_subcommands` and `old_options`: names of earlier versions, and their replacements;
@@ -55,7 +55,7 @@ use terminal::writer;
 #[derive(Debug, Parser)]
 #[command(name = "hapterra", version)]
 pub struct Cli {
-    /// Say more: -v progress, -vv details, -vvv everything
+    /// Print more messages: -v progress, -vv details, -vvv everything
     #[arg(short, long, action = ArgAction::Count, global = true)]
     pub verbose: u8,
 
@@ -73,7 +73,7 @@ pub enum Command {
     Cut(cut::Args),
     /// Serve a terrain to a device and record what it renders
     Run(run::Args),
-    /// Show it all: a terrain, a board, a scripted hand on it, and a picture
+    /// Run a whole session: a terrain, a board, a scripted hand, and a picture
     Demo(demo::Args),
     /// Render the forces along a trajectory, tick by tick
     Replay(replay::Args),

@@ -25,6 +25,9 @@ const OPENING: &[&str] = &["run", "demo", "replay", "view", "info", "cut"];
 /// Commands that emulate a board.
 const EMULATING: &[&str] = &["demo", "replay", "status", "calibrate"];
 
+/// Commands of `hapterra-lab` that draw a picture.
+const DRAWING: &[&str] = &["contact", "streaming", "stability"];
+
 /// The table's text for a key of a surface file.
 const IN_SURFACE: &str = "--surface FILE.toml";
 
@@ -150,6 +153,8 @@ const OLD: &[RemovedOption] = &[
         "",
     ),
     old(&["replay"], "--on", "--device emulated", ""),
+    old(&["bringup"], "--log", "-o FILE.toml", ""),
+    old(&["view"], "--rrd", "-o OUT.rrd", ""),
     old(&["replay", "cut", "calibrate"], "--output", "-o FILE", ""),
     old(
         &["view"],
@@ -157,6 +162,7 @@ const OLD: &[RemovedOption] = &[
         "the second argument, as view RECORDING TERRAIN",
         "",
     ),
+    old(&["cut"], "--most-samples", "--max-samples 4000000", ""),
     old(&["calibrate"], "--no-walk", "--measure none", ""),
     old(
         &["calibrate"],
@@ -181,6 +187,7 @@ const OLD: &[RemovedOption] = &[
 /// Options of `hapterra-lab`.
 const OLD_IN_LAB: &[RemovedOption] = &[
     old(&["stability"], "--delay-us", "--delay 200us", ""),
+    old(DRAWING, "--picture", "-o FILE.png", ""),
     old(&["streaming"], "--latencies", "--latency 20ms,50ms", ""),
     old(&["synth"], "--cell-m", "--cell 10m", ""),
 ];
@@ -215,7 +222,7 @@ mod tests {
     fn arguments(command: &str) -> Vec<&str> {
         let rest: &[&str] = match command {
             "replay" => &["t.tif", "path.csv"],
-            "status" | "calibrate" | "demo" => &[],
+            "status" | "calibrate" | "demo" | "bringup" => &[],
             _ => &["t.tif"],
         };
         [&["hapterra", command], rest].concat()

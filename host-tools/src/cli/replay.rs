@@ -21,8 +21,8 @@ use crate::materials::Materials;
 use crate::output::{Output, check_distinct};
 use crate::replay::settings::{Device, PlacementSettings};
 use crate::replay::{
-    Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Ticks, Trajectory,
-    on_native_at, replay_trajectory,
+    Mark, OfflineDevice, Pace, Record, ReplayError, Rule, Settings, Summary, Trajectory,
+    TrajectoryTicks, on_native_at, replay_trajectory,
 };
 use crate::stability;
 use crate::terrain::Terrain;
@@ -169,7 +169,7 @@ pub fn run_with_rule(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
     }
     if summary.leaps > 0 {
         eprintln!(
-            "{} rows move the HIP by more than the device's window: contact begins anew there",
+            "{} rows move the HIP by more than the device's window: contact starts again there",
             summary.leaps
         );
     }
@@ -247,7 +247,7 @@ impl<'t> Inputs<'t> {
 fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
     if !args.trajectory.is_file() {
         return Err("the recording must be a regular file, because it is read twice")
-            .or_hint("write it to a file first, or take the path alone with --ignore-settings");
+            .or_hint("write it to a file first, or replay the path alone with --ignore-settings");
     }
     let cells = args.terrain.reading.cells();
     let lines = differences(&args.rendering, cells, (&args.trajectory, recorded));
@@ -256,7 +256,7 @@ fn check_options(args: &Args, recorded: &Settings) -> Result<(), Failure> {
         return Err(format!(
             "{line}: a recording of {views} placements is rendered in its own"
         ))
-        .or_hint("leave that option out, or take the path alone with --ignore-settings");
+        .or_hint("leave that option out, or replay the path alone with --ignore-settings");
     }
     for line in lines {
         eprintln!("note: {line}");
@@ -279,7 +279,7 @@ fn check_rule(rule: Rule, params: &SurfaceParams) -> Result<(), Failure> {
     match rule == Rule::Paper && *params != plain {
         false => Ok(()),
         true => Err("an effect with the published contact rule, which has none")
-            .or_hint("leave out what --surface and --friction add, or take the path alone with --ignore-settings"),
+            .or_hint("leave out what --surface and --friction add, or replay the path alone with --ignore-settings"),
     }
 }
 
@@ -289,14 +289,14 @@ fn rate_of(recorded: &Settings) -> Result<TickRate, Failure> {
     let why = format!("the recording has tick_hz = {tick_hz}, and no device has that rate");
     TickRate::new(tick_hz)
         .ok_or(why)
-        .or_hint("correct tick_hz in its settings (whole kilohertz from 1000 to 10000), or take its path alone with --ignore-settings")
+        .or_hint("correct tick_hz in its settings (whole kilohertz from 1000 to 10000), or replay its path alone with --ignore-settings")
 }
 
 fn native(
     args: &Args,
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let (params, rule) = replayed.params;
     let rate = replayed.recorded_at.unwrap_or_default();
     let mut replayer = on_native_at(rate, replayed.terrain, params)?;
@@ -311,7 +311,7 @@ fn emulated(
     board: &EmulatedBoard,
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let (params, rule) = replayed.params;
     if rule == Rule::Paper {
         return Err("no device has the published contact rule of this recording")
@@ -325,7 +325,7 @@ fn emulated(
     let replayed = replay(args, replayed, trajectory, &mut replayer)?;
     replayer.close()?;
     if let Err(why) = emulator.finish() {
-        tracing::info!("the emulated board did not end well: {why}");
+        tracing::info!("the emulated board ended with an error: {why}");
     }
     Ok(replayed)
 }
@@ -336,13 +336,13 @@ fn ticks(
     replayed: &Inputs<'_>,
     trajectory: Trajectory,
     tick_hz: u32,
-) -> Result<Ticks, Failure> {
+) -> Result<TrajectoryTicks, Failure> {
     let recorded = replayed.recorded_at.map(TickRate::hz);
     if let Some(recorded_hz) = recorded.filter(|hz| *hz != tick_hz) {
         let why =
             format!("the recording has {recorded_hz} ticks a second, and the device has {tick_hz}");
         return Err(why).or_hint(
-            "replay it with --device native, or take its path alone, by its own times, with --ignore-settings",
+            "replay it with --device native, or replay its path alone, by its own times, with --ignore-settings",
         );
     }
     let pace = match recorded {
@@ -350,7 +350,7 @@ fn ticks(
         Some(_) => Pace::Recorded,
         None => Pace::ByTime,
     };
-    Ok(Ticks::new(trajectory, pace, tick_hz))
+    Ok(TrajectoryTicks::new(trajectory, pace, tick_hz))
 }
 
 fn replay<'t>(
@@ -358,7 +358,7 @@ fn replay<'t>(
     replayed: &Inputs<'t>,
     trajectory: Trajectory,
     replayer: &mut OfflineDevice<'t>,
-) -> Result<(Summary, Ticks), Failure> {
+) -> Result<(Summary, TrajectoryTicks), Failure> {
     let mut ticks = ticks(args, replayed, trajectory, replayer.device().tick_hz)?;
     let progress = progress::bar(None, "{spinner} {human_pos} rows, {per_sec}");
     interrupt::listen();

@@ -28,7 +28,6 @@ use hapterra_core::wire::session::SILENCE_S;
 use super::failure::{Failure, OrHint};
 use super::options::events::{self, EventOptions};
 use super::options::placing::Placing;
-use super::options::quantity::TIME;
 use super::options::rendering::Rendering;
 use super::options::steering::Commands;
 use super::options::terrain_file::TerrainFile;
@@ -39,6 +38,7 @@ use super::terminal::writer::notify;
 use super::terminal::{interrupt, partial_files};
 use super::viewing::{PreparedViewer, Viewing};
 use crate::output::check_distinct;
+use crate::quantity::TIME;
 use crate::steering::keys::KEYS;
 use devices::{OneDevice, ServedDevice};
 use placed::{InReach, Placed};
@@ -231,7 +231,7 @@ fn check_stiffness(n_per_mm: f32) -> Result<(), Failure> {
     Err(Failure::new(format!(
         "a stiffness of {n_per_mm} N/mm: no arm renders more than {MAX_TESTED_N_PER_MM} N/mm"
     ))
-    .hint("people hold 0.4 to 0.8 N/mm: hapterra-lab stability tries what an arm holds still"))
+    .hint("0.4 to 0.8 N/mm are usual: hapterra-lab stability computes the stiffnesses at which an arm is stable"))
 }
 
 /// Converts each item, or returns the error of the first that fails.
@@ -255,10 +255,10 @@ fn share_keyboard(args: &Args, devices: &[OneDevice]) -> Vec<Arc<DeviceKeys>> {
         .is_some_and(|device_keys| device_keys.has_keys())
     {
         true => notify(format!(
-            "keys           1 to {last} choose the device that keys go to, and come before each Enter: {KEYS}"
+            "keys           1 to {last} select the device that receives the keys, also directly before each Enter: {KEYS}"
         )),
         false => notify(format!(
-            "Enter          goes to the device whose number, 1 to {last}, is right before it"
+            "Enter          is for the device whose number, 1 to {last}, is typed directly before it"
         )),
     }
     device_keys

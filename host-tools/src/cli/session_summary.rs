@@ -66,11 +66,11 @@ impl SessionSummary {
         let reported = [
             (
                 stats.uncertain,
-                "sessions whose end is not known: more may be lost",
+                "sessions with an unknown end: more may be lost",
             ),
-            (stats.foreign_frames, "frames of other sessions, not heeded"),
-            (stats.no_tiles, "requests for tiles that there are not"),
-            (stats.unanswered, "requests and questions without an answer"),
+            (stats.foreign_frames, "frames of other sessions, ignored"),
+            (stats.no_tiles, "requests for tiles that do not exist"),
+            (stats.unanswered, "requests and queries without an answer"),
         ];
         for (count, what) in reported.iter().filter(|(count, _)| *count > 0) {
             text += &format!("link           {count} {what}\n");

@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long)]
     pub clear: bool,
 
-    /// Disarm: force goes out within a tenth of a second
+    /// Disarm: the force falls to zero within a tenth of a second
     #[arg(long)]
     pub disarm: bool,
 
@@ -107,7 +107,7 @@ fn calibration(status: &Status) -> String {
         }
         CalibrationSource::Stored => format!("{model}stored on the device"),
         CalibrationSource::Session => {
-            format!("{model}from a host; gone when the device restarts")
+            format!("{model}from a host, until the device restarts")
         }
     }
 }
@@ -115,7 +115,7 @@ fn calibration(status: &Status) -> String {
 fn boot(boot: &BootReport) -> String {
     let cause = match boot.cause {
         ResetCause::Unknown => "for an unknown reason",
-        ResetCause::PowerOn => "when power came up",
+        ResetCause::PowerOn => "at power-up",
         ResetCause::Pin => "by the reset button or a debug probe",
         ResetCause::Software => "by its own program",
         ResetCause::Watchdog => "by the watchdog",
@@ -217,7 +217,7 @@ fn measured(status: &Status) -> String {
          amplifiers     {}ready, outputs {}as set\n\
          currents       {} A{flowing}\n\
          motors         {} °C by the thermal model\n\
-         energy         {:.3} mJ created by the ticks and not taken back yet\n\
+         energy         {:.3} mJ created by sampling and not dissipated yet\n\
          ticks          {} run, {} late; the last cost {:.1} µs, the costliest {:.1} µs\n\
          stack          {stack}\n",
         three(health.angles_rad.to_array().map(f32::to_degrees)),

@@ -35,13 +35,13 @@ pub struct Args {
     #[command(flatten)]
     pub reading: ReadingOptions,
 
-    /// Show a recording's path on another terrain, too
+    /// Show a recording's path also on another terrain
     #[arg(long)]
     pub ignore_settings: bool,
 
-    /// Write a recording for rerun's own viewer, too
-    #[arg(long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
-    pub rrd: Option<PathBuf>,
+    /// Also write a recording for rerun's own viewer
+    #[arg(short, long, value_name = "OUT.rrd", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
 
     /// Rendering of the terrain, if the recording does not state it.
     #[command(flatten)]
@@ -59,8 +59,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let path = path_of(args, recorded.as_ref())?;
     let mut inputs = files_read_with(&path);
     inputs.push(args.recording.clone());
-    let outputs = Vec::from_iter(args.rrd.as_deref());
-    check_distinct(&outputs, &inputs).or_hint("name another file with --rrd")?;
+    let outputs = Vec::from_iter(args.out.as_deref());
+    check_distinct(&outputs, &inputs).or_hint("name another file with -o")?;
     let program = Program::find()?;
     let file = TerrainFile {
         file: path.clone(),
@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         laid_mm: None,
         is_live: false,
     };
-    let program = program.writing(args.rrd.as_deref());
+    let program = program.writing(args.out.as_deref());
     interrupt::listen();
     let feed = ViewFeed::start(&program, picture.prepare(), None)?;
     let recorded = recorded.as_ref();

@@ -47,7 +47,7 @@ impl Hint for ProgramError {
                 "in hapterra's sources type: cargo xtask view; then put the program that it names beside hapterra, or name it in {VARIABLE}"
             ),
             Self::NotStarted { .. } => {
-                format!("build it anew with: cargo xtask view; {VARIABLE} may name another")
+                format!("rebuild it with: cargo xtask view; {VARIABLE} may name another")
             }
         }
     }
@@ -164,7 +164,7 @@ pub(in crate::cli) fn end(feed: ViewFeed<'_>, print_line: impl Fn(String)) {
     let (dropped, viewer) = feed.finish();
     if dropped.messages > 0 {
         print_line(format!(
-            "view           {} messages with {} samples were not shown: the viewer was slow, or gone",
+            "view           {} messages with {} samples were not shown: the viewer was slow, or had ended",
             dropped.messages, dropped.samples
         ));
     }

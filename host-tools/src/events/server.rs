@@ -275,6 +275,7 @@ mod tests {
         });
     }
 
+    /// Safety: 30.
     #[test]
     fn stuck_reader_delays_no_other_reader_and_gets_drop_count() {
         let server = Server::listen(0).expect("listens");
@@ -301,7 +302,7 @@ mod tests {
             let lines = rest.and_then(|rest| rest.strip_suffix('}')?.parse().ok());
             notice_of_thread.fetch_add(lines.unwrap_or(0), Ordering::AcqRel);
         });
-        wait_until("what it missed is said", || {
+        wait_until("its lost lines are reported", || {
             sender.offer("{}\n".to_owned());
             notice.load(Ordering::Acquire) > 0
         });
@@ -309,6 +310,7 @@ mod tests {
         assert!(server.end() >= notice.load(Ordering::Acquire));
     }
 
+    /// Safety: 30.
     #[test]
     fn full_queue_drops_and_counts_lines_without_blocking() {
         let (lines, _waiting) = sync_channel(2);
@@ -328,7 +330,7 @@ mod tests {
         let server = Server::listen(0).expect("listens");
         drop(connected(&server));
         let sender = server.sender();
-        wait_until("nobody reads", || {
+        wait_until("there is no reader", || {
             sender.offer("{}\n".to_owned());
             sender.readers_joined().is_none()
         });

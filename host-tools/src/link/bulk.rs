@@ -102,14 +102,14 @@ pub trait Pipes {
     /// packet ends it.
     ///
     /// # Errors
-    /// When the device is gone or does not accept the transfer.
+    /// When the device is disconnected or does not accept the transfer.
     fn send(&mut self, transfer: &[u8]) -> io::Result<()>;
 
     /// Receives the available bytes; waits at most `wait` for the first. A time-out may be zero
     /// bytes or an error that reports it.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
 }
 
@@ -148,6 +148,7 @@ mod tests {
         assert!(!is_hapterra(VENDOR_ID, 0x0002, Some(PRODUCT)));
     }
 
+    /// Safety: 34.
     #[test]
     fn selection_among_several_boards_needs_a_unique_serial() {
         let serials = ["0039001A", "0039001B"].map(|serial| Some(serial.to_owned()));

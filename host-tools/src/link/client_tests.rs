@@ -212,8 +212,9 @@ fn repeated_device_messages_open_one_session() {
     });
 }
 
+/// Safety: images.
 #[test]
-fn hello_is_repeated_despite_noise_until_it_times_out() {
+fn opening_is_repeated_despite_noise_until_it_times_out() {
     on_bench(None, |bench| {
         let foreign = SessionNumber::new(7);
         let mut noise = 0;
@@ -253,6 +254,7 @@ fn scene_without_ack_times_out_after_ten_attempts() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn telemetry_does_not_count_as_answer() {
     on_bench(None, |bench| {
@@ -271,6 +273,7 @@ fn telemetry_does_not_count_as_answer() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn unanswered_arm_is_retried_reported_and_then_disarmed() {
     on_bench(Some(Arming::default()), |bench| {
@@ -382,6 +385,7 @@ fn tile_requests_wait_for_the_answer_to_zero() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn late_or_same_protocol_version_refusal_is_ignored() {
     on_bench(None, |bench| {
@@ -432,6 +436,7 @@ fn restarted_device_gets_the_scene_again() {
     });
 }
 
+/// Safety: 32, images.
 #[test]
 fn frames_of_another_host_end_the_session() {
     on_bench(None, |bench| {
@@ -501,6 +506,7 @@ fn session_closed_by_device_ends_client_with_its_reason() {
     }
 }
 
+/// Safety: 32.
 #[test]
 fn late_session_closed_message_ends_no_other_session() {
     let ends = [SessionEnd::Replaced, SessionEnd::HostSilent];
@@ -560,6 +566,7 @@ fn leaving_client_fails_only_if_session_was_replaced() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn close_request_is_retried_until_confirmed_or_times_out() {
     on_bench(None, |bench| {
@@ -638,6 +645,7 @@ fn nonexistent_tile_requests_are_counted_and_rarely_logged() {
     });
 }
 
+/// Safety: 6.
 #[test]
 fn reconnected_physical_arm_is_not_rearmed_automatically() {
     for (arming, again) in [(Arming::default(), 0), (Arming::VIRTUAL, 1)] {

@@ -42,7 +42,7 @@ struct Exchange<'t> {
     reader: Box<FrameReader<MAX_FRAME>>,
     /// True if the session has put a scene in force, or sent a request that drives the arm.
     has_driven: bool,
-    /// True if its end was sent, or the other end is gone.
+    /// True if its end was sent, or the other end is closed.
     is_over: bool,
 }
 
@@ -412,6 +412,7 @@ mod tests {
         assert_eq!(known, Some(Calibration::PREMIUM_1_5));
     }
 
+    /// Safety: 32.
     #[test]
     fn read_only_session_is_not_recorded_as_a_host() {
         let mut device = Native::for_replay().free_running();
@@ -424,7 +425,7 @@ mod tests {
         drop(control);
         let host = ControlSession::open(Box::new(&mut device), TIMEOUT).expect("it answers");
         let before = host.device().last.end;
-        assert_eq!(before, SessionEnd::None, "nobody was its host before");
+        assert_eq!(before, SessionEnd::None, "it had no host before");
     }
 
     #[test]
@@ -468,6 +469,7 @@ mod tests {
         }
     }
 
+    /// Safety: 32.
     #[test]
     fn repeated_old_answers_are_not_mistaken_for_new_ones() {
         let device = Late(Native::for_replay().free_running(), vec![]);
@@ -509,7 +511,8 @@ mod tests {
             assert_eq!((last.end, epoch), (SessionEnd::Goodbye, None));
             assert!(reading.status().is_ok());
         }
-        // A session that has requested arming, even in vain, closes, so the device records it.
+        // A session that has requested arming, even if it was refused, closes, so the device
+        // records it.
         let before = open(&mut device).device().last.session;
         let mut arming = open(&mut device);
         let blocked = arming.request(&Request::Arm).expect("it answers");
@@ -560,6 +563,7 @@ mod tests {
         }
     }
 
+    /// Safety: 26.
     #[test]
     fn unconfirmed_close_is_an_error_within_bounded_time() {
         let timeout = Duration::from_millis(300);

@@ -60,7 +60,7 @@ impl FromStr for DeviceAddress {
             (_, Some(("usb", serial))) if !serial.is_empty() => {
                 Ok(Self::Usb(Some(serial.to_owned())))
             }
-            ("emulated", _) => Err("a board that is emulated for one command renders a terrain in `hapterra demo --device emulated`; for one that runs already, say tcp:HOST:PORT+plant:HOST:PORT".into()),
+            ("emulated", _) => Err("a board that is emulated for one command renders a terrain in `hapterra demo --device emulated`; for one that runs already, use tcp:HOST:PORT+plant:HOST:PORT".into()),
             (_, Some(("tcp", address))) => tcp_address(address).map(Self::Tcp),
             _ => Err("a device is usb, usb:SERIAL, tcp:HOST:PORT or native".into()),
         }

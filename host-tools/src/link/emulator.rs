@@ -18,7 +18,7 @@ use heightfield::regular_file;
 pub const IMAGE_VARIABLE: &str = "HAPTERRA_MPS2_ELF";
 /// Environment variable that names QEMU when no option does.
 pub const QEMU_VARIABLE: &str = "HAPTERRA_QEMU";
-/// QEMU's name when no option says otherwise.
+/// QEMU's default name.
 pub const QEMU: &str = "qemu-system-arm";
 /// Max time for QEMU to connect its lines.
 const START_TIMEOUT: Duration = Duration::from_secs(60);

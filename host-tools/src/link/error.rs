@@ -20,16 +20,18 @@ pub enum LinkError {
     #[error("several hapterra boards: {}", .0.join(", "))]
     Several(Vec<String>),
     /// The transport broke while the device was in use.
-    #[error("the device is gone")]
+    #[error("the device was disconnected")]
     Disconnected(#[source] io::Error),
     /// The transport is open, but the device does not answer.
     #[error("the device has not answered for {0:.1?}")]
     Silent(Duration),
     /// Another host controls the device.
-    #[error("another host has taken the device: the arm may be armed")]
+    #[error("another host controls the device: the arm may be armed")]
     Taken,
     /// The device has not received a message of this host for too long, and has disarmed the arm.
-    #[error("the device has not heard this computer for too long, and has disarmed the arm")]
+    #[error(
+        "the device has received nothing from this computer for too long, and has disarmed the arm"
+    )]
     HostSilent,
     /// The close message was not answered.
     #[error("the board did not confirm that it is disarmed: switch the amplifiers off")]
@@ -48,7 +50,7 @@ pub enum LinkError {
         theirs: u16,
     },
     /// The device refused the scene.
-    #[error("the device refused the scene: it finds a number in it that it cannot work with")]
+    #[error("the device refused the scene: it contains an invalid number")]
     SceneRefused,
     /// The device was restarted during an operation that cannot be resumed.
     #[error("the device was restarted and lost its session")]

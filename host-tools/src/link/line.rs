@@ -8,7 +8,7 @@ use super::transport::{NoLine, Transport};
 
 /// Time between two checks of the clock during a wait.
 pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// Max time for a device to read the bytes of one message before it counts as gone.
+/// Max time for a device to read the bytes of one message before it counts as disconnected.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Line of a [`Session`](super::Session) or [`ControlSession`](super::ControlSession).

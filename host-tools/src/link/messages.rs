@@ -73,7 +73,7 @@ impl Inbox {
     /// skipped: they are the rest of earlier messages.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     pub(super) fn next<T: DeserializeOwned>(
         &mut self,
         transport: &mut dyn Transport,

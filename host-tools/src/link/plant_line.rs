@@ -11,11 +11,11 @@ use super::messages::{Inbox, send};
 use super::transport::Transport;
 use crate::phantom::HeldPhantom;
 
-/// Moves the arm with the board's ticks until `stop` returns true or the board is gone. The board's
-/// time stops until it has received a tick's counts.
+/// Moves the arm with the board's ticks until `stop` returns true or the board is disconnected. The
+/// board's time stops until it has received a tick's counts.
 ///
 /// # Errors
-/// When the board is gone.
+/// When the board is disconnected.
 pub fn serve_plant(
     transport: &mut dyn Transport,
     arm: &mut HeldPhantom,

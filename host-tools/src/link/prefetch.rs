@@ -7,7 +7,7 @@ use crate::terrain::Terrain;
 
 /// Time ahead of the HIP, seconds: longer than the response time of a distant server.
 const LOOKAHEAD_S: f64 = 0.5;
-/// Time between two positions, seconds: positions of adjacent ticks give no useful speed.
+/// Time between two positions, seconds: positions of adjacent ticks yield no useful speed.
 const MIN_INTERVAL_S: f64 = 0.05;
 /// Max distance from the HIP's tile, tiles. For a faster HIP nothing is prefetched: the tiles would
 /// arrive after it has passed them.

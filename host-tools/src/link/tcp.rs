@@ -63,7 +63,7 @@ impl Tcp {
 impl Transport for Tcp {
     fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
         let start = Instant::now();
-        // The time-out holds for all bytes, so a device that reads a byte now and then also counts
+        // The time-out applies to all bytes, so a device that reads a byte now and then also counts
         // as gone.
         while !bytes.is_empty() {
             let remaining = TIMEOUT.saturating_sub(start.elapsed());

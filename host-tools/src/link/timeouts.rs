@@ -18,7 +18,7 @@ pub struct Timeouts {
     /// Time without an answer after which the host sends the open message again. A restarted device
     /// needs it; otherwise it changes nothing.
     pub hello_retry: Duration,
-    /// Time without an answer after which the device counts as gone.
+    /// Time without an answer after which the device counts as disconnected.
     pub give_up: Duration,
     /// Max time for the device to disarm and confirm it.
     pub goodbye: Duration,

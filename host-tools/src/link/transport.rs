@@ -9,21 +9,21 @@ pub trait Transport {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     /// Receives the available bytes; waits at most `wait` for the first. Returns zero if none
     /// arrived in that time.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     fn receive(&mut self, into: &mut [u8], wait: Duration) -> io::Result<usize>;
 
     /// Sends as much of `bytes` as the device reads within about `wait`; returns the number of sent
     /// bytes. A transport that never waits for its device sends all of them.
     ///
     /// # Errors
-    /// When the device is gone.
+    /// When the device is disconnected.
     fn send_some(&mut self, bytes: &[u8], wait: Duration) -> io::Result<usize> {
         let _ = wait;
         self.send(bytes).map(|()| bytes.len())

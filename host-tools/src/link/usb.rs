@@ -15,7 +15,7 @@ use super::error::LinkError;
 
 /// Number of concurrent transfers from the device, so that none of its packets waits.
 const TRANSFERS: usize = 4;
-/// Max time for the board to read a transfer before it counts as gone. A board reads within
+/// Max time for the board to read a transfer before it counts as disconnected. A board reads within
 /// milliseconds, and the user's end of a session waits for this.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 

@@ -17,7 +17,7 @@ pub enum GroundError {
     },
     /// Their reference systems differ, and no conversion between them is known.
     #[error(
-        "{file} is in a reference system without known longitudes and latitudes, which is not that of {other}"
+        "{file} is in a reference system that cannot be converted to longitude and latitude, and not in that of {other}"
     )]
     NoConversion {
         /// The file in that system.
@@ -34,7 +34,7 @@ pub enum GroundError {
         terrain: String,
     },
     /// They do not overlap.
-    #[error("{classes} lies elsewhere than {terrain}: {there}, and the terrain {here}")]
+    #[error("{classes} does not overlap {terrain}: {there}, and the terrain {here}")]
     Apart {
         /// The file of classes.
         classes: String,

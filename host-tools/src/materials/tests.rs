@@ -266,7 +266,10 @@ fn url_key_is_in_no_recording_and_no_message() {
             .contains("read where it is touched")
     );
     let apart = at(900_000.0).expect_err("elsewhere").to_string();
-    assert!(apart.contains("https://host/c.tif lies"), "{apart}");
+    assert!(
+        apart.contains("https://host/c.tif does not overlap"),
+        "{apart}"
+    );
 }
 
 #[test]

@@ -15,7 +15,7 @@
 //! terrain in front of that arm.
 //!
 //! Nothing here reads a clock or draws a random number, and the trigonometry
-//! is `libm`'s, so the same inputs give the same bits on every machine.
+//! is `libm`'s, so the same inputs result in the same bits on every machine.
 //!
 //! # Frames
 //! - *Device frame*, metres: origin where the joint axes meet, z up, x away

@@ -2,7 +2,7 @@
 //!
 //! Each step is cut into substeps of at most 50 µs (20 in a millisecond). A substep is half a kick,
 //! a drift, half a kick (velocity Verlet), with the friction of `friction.rs` in each kick. The
-//! method has second order: half the substep gives a quarter of the error, which
+//! method has second order: half the substep has a quarter of the error, which
 //! `halving_the_substep_...` measures below a tenth of a micrometre, 1/200 of an encoder count.
 
 use glam::{DMat3, DVec3};

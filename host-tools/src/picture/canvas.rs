@@ -23,7 +23,7 @@ pub enum PictureError {
     #[error("{0}: {source}", source = .0.source)]
     Write(OutputError),
     /// `plotters` failed, for example on an area without room.
-    #[error("cannot lay out the picture: {0}")]
+    #[error("cannot draw the picture: {0}")]
     Layout(String),
 }
 

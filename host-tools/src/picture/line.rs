@@ -86,7 +86,7 @@ pub fn runs(points: impl Iterator<Item = (f64, bool)>, gap: f64) -> Vec<(f64, f6
     runs
 }
 
-/// Returns a piece as a line, and a single point as a dot.
+/// Returns a segment as a line, and a single point as a dot.
 fn finish_line(piece: &mut Vec<(f64, f64)>) -> Option<Vec<(f64, f64)>> {
     let mut piece = std::mem::take(piece);
     if let [only] = piece[..] {

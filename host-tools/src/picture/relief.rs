@@ -181,8 +181,8 @@ impl PixelHeights {
         ]
     }
 
-    /// Returns the range of nearly all pixels, so that one spike does not give the rest one colour,
-    /// and the range of all.
+    /// Returns the range of nearly all pixels, so that one spike does not leave the rest in one
+    /// colour, and the range of all.
     fn ranges(&self) -> ((f64, f64), (f64, f64)) {
         let known = sorted(self.heights.iter().flatten().copied());
         let between = |clipped: f64| {

@@ -7,7 +7,7 @@ use crate::terrain::ScaleError;
 pub enum PlaceError {
     /// Longitude and latitude, in a file with an unknown reference system.
     #[error(
-        "the file states no reference system, so it is not known where a longitude and latitude are in it; it covers {bounds}"
+        "the file states no reference system, so a longitude and latitude cannot be located in it; it covers {bounds}"
     )]
     NoSystem {
         /// Bounds of the terrain, in its own coordinates.
@@ -15,7 +15,7 @@ pub enum PlaceError {
     },
     /// Longitude and latitude, in a file with an unknown projection.
     #[error(
-        "the projection of the file's reference system ({system}) is not known here, so it is not known where a longitude and latitude are in it; it covers {bounds}"
+        "the projection of the file's reference system ({system}) is not supported, so a longitude and latitude cannot be located in it; it covers {bounds}"
     )]
     NoProjection {
         /// Its name.
@@ -36,7 +36,7 @@ pub enum PlaceError {
         bounds: String,
     },
     /// A code without a reference system.
-    #[error("no reference system EPSG:{0} is known here")]
+    #[error("the reference system EPSG:{0} is not supported")]
     UnknownCode(u16),
     /// A reference system without a transformation to the file's.
     #[error("EPSG:{code} and the file's reference system ({system}) have no datum in common")]
@@ -123,7 +123,7 @@ pub enum PlaceError {
     },
     /// A box across the border of a raster that goes around the globe.
     #[error(
-        "the box {place} lies across the end of the terrain, which goes around the globe: its parts are --bbox {} and --bbox {}, ask for one of them", .parts[0], .parts[1]
+        "the box {place} lies across the end of the terrain, which goes around the globe: its parts are --bbox {} and --bbox {}, choose one of them", .parts[0], .parts[1]
     )]
     BoxInTwoParts {
         /// The requested box.
@@ -152,7 +152,7 @@ pub enum PlaceError {
     #[error("the place under the home position, ({:.0}, {:.0}, {:.0}) mm, is too far from the origin", .0[0], .0[1], .0[2])]
     FarAway([f64; 3]),
     /// A calibration whose stops leave no workspace.
-    #[error("the calibration leaves the arm no room to lay a terrain into")]
+    #[error("the calibration leaves no workspace to fit a terrain to")]
     NoReach,
     /// Numbers that are no valid scale.
     #[error(transparent)]

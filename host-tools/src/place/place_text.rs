@@ -56,7 +56,7 @@ fn kind_in_words(kind: LonLat<'_>) -> String {
             format!(" of WGS 84, usually within {within_m} m")
         }
         LonLat::OfOwnDatum { name } => {
-            format!(" of its own datum ({name}), whose way to WGS 84 is not known here")
+            format!(" of its own datum ({name}), whose conversion to WGS 84 is not supported")
         }
         LonLat::OfBody { name, radius_m } => {
             let kilometres = radius_m / 1000.0;

@@ -15,7 +15,7 @@ use crate::terrain::{
 /// Relief of a fitted terrain without true proportions, because its file does not state its cell
 /// size, mm.
 const RELIEF_MM: f64 = 25.0;
-/// Relief that a hand feels clearly, mm.
+/// Relief that is clearly perceptible in the hand, mm.
 pub(crate) const CLEAR_RELIEF_MM: f64 = 15.0;
 /// Device millimetres for each haptic cell, at a place without a stated scale.
 const CELL_MM: f64 = 1.0;

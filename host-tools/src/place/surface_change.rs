@@ -42,14 +42,14 @@ pub enum SurfaceError {
         static_mu: f32,
     },
     /// A time outside its range.
-    #[error("a viscous friction of {0} s: from 0 to {max} s can be had", max = Friction::MAX_VISCOUS_S)]
+    #[error("a viscous friction of {0} s: from 0 to {max} s are possible", max = Friction::MAX_VISCOUS_S)]
     ViscousFriction(f32),
     /// Damping outside its range.
-    #[error("a damping of {0} N·s/m: from 0 to {max} N·s/m can be had", max = Damping::MAX_NS_PER_M)]
+    #[error("a damping of {0} N·s/m: from 0 to {max} N·s/m are possible", max = Damping::MAX_NS_PER_M)]
     Damping(f32),
     /// A texture outside its range, or too fine for a tick.
     #[error(
-        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {max} mm can be had",
+        "a texture of {amplitude_mm} mm every {wavelength_mm} mm: a wavelength from {shortest} to {longest} mm, and an amplitude above 0 up to an eighth of it and {max} mm are possible",
         shortest = Texture::WAVELENGTHS_MM.0,
         longest = Texture::WAVELENGTHS_MM.1,
         max = Texture::MAX_AMPLITUDE_MM
@@ -62,7 +62,7 @@ pub enum SurfaceError {
     },
     /// A quantity that each material of the scene has for itself.
     #[error(
-        "each material of the scene has its own: change the table and begin anew, or begin without --materials"
+        "each material of the scene has its own: change the table and start again, or start without --materials"
     )]
     OfMaterials,
 }

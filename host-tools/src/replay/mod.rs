@@ -3,8 +3,8 @@
 //!
 //! A replay is in lock-step: the device renders one point in each tick, answers, and only then gets
 //! the next. Every point is rendered exactly once, with all the terrain it needs, so the result
-//! depends only on the terrain, the surface parameters, the trajectory and the tick rate. [`Ticks`]
-//! computes the HIP's position in each tick.
+//! depends only on the terrain, the surface parameters, the trajectory and the tick rate.
+//! [`TrajectoryTicks`] computes the HIP's position in each tick.
 
 mod loop_columns;
 mod marks;
@@ -13,8 +13,8 @@ mod published;
 mod recording;
 pub mod settings;
 mod states;
-mod ticks;
 mod trajectory;
+mod trajectory_ticks;
 
 pub use loop_columns::{LoopColumns, mode_name};
 pub use marks::Mark;
@@ -22,10 +22,10 @@ pub use offline_device::OfflineDevice;
 pub use recording::{COLUMNS, Column, Record, Recording, TICK_COLUMNS, Value};
 pub use settings::{Rule, Settings};
 pub use states::state_name;
-pub use ticks::{Pace, Tick, Ticks};
 pub use trajectory::{
     ColumnValues, RecordedColumns, RecordingRow, RecordingRows, Row, Trajectory, TrajectoryError,
 };
+pub use trajectory_ticks::{Pace, Tick, TrajectoryTicks};
 
 use hapterra_core::contact::ContactState;
 use hapterra_core::force::SurfaceParams;
@@ -92,7 +92,7 @@ pub type OnSample<'f, 't> = dyn FnMut(&TickRecord, &Record, (u32, &Terrain<'t>))
 /// [`ReplayError`] reports the fault with file, line and column.
 pub fn replay_trajectory<'t>(
     replayer: &mut OfflineDevice<'t>,
-    ticks: &mut Ticks,
+    ticks: &mut TrajectoryTicks,
     settings: &Settings,
     output: Output,
     on_sample: &mut OnSample<'_, 't>,

@@ -425,7 +425,7 @@ impl Settings {
         let difference = if self.terrain.fingerprint != digits(terrain) {
             let (recorded, raster) = (self.terrain.samples, terrain.raster());
             match recorded == [raster.columns(), raster.rows()] {
-                true => "its heights are others".to_owned(),
+                true => "its heights differ".to_owned(),
                 false => format!(
                     "{} × {} samples, not {} × {}",
                     raster.columns(),
@@ -437,7 +437,7 @@ impl Settings {
         } else if let Some(difference) = self.rendered.difference(terrain.grid()) {
             difference
         } else if self.has_other_classes(terrain.grid()) {
-            "the classes of its materials are others".to_owned()
+            "the classes of its materials differ".to_owned()
         } else {
             return Ok(());
         };

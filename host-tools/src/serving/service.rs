@@ -14,7 +14,7 @@ use crate::terrain::Terrain;
 const POLL: Duration = Duration::from_millis(50);
 
 /// Remark for a device that has disarmed because its host was silent.
-const WAS_SILENT: &str = "before this the device had heard nothing from its host for too long: it let the force out and disarmed the arm";
+const WAS_SILENT: &str = "before this the device had received nothing from its host for too long: it faded the force out and disarmed the arm";
 
 /// Opens a line to the device.
 pub type Connect<'s, 't> = Box<dyn FnMut() -> Result<Box<dyn Transport + 't>, LinkError> + 's>;
@@ -144,7 +144,7 @@ impl<'t> ServedSession<'_, 't> {
         Ok(())
     }
 
-    /// Reports that the device is gone, waits for it and resumes the session.
+    /// Reports the disconnection, waits for the device and resumes the session.
     fn wait_for_device(
         &mut self,
         handler: &mut dyn SessionHandler<'t>,
@@ -159,8 +159,8 @@ impl<'t> ServedSession<'_, 't> {
             match self.resume(handler) {
                 Ok(device) => {
                     let again = match device.epoch == Some(self.session.scene().epoch) {
-                        true => "goes on where it was",
-                        false => "was restarted and begins anew",
+                        true => "continues where it was",
+                        false => "was restarted and starts again",
                     };
                     let after = start.elapsed();
                     handler.notify(&format!("the device is back after {after:.1?}: it {again}"));

@@ -235,13 +235,14 @@ fn finished_run_closes_the_session_or_reports_no_confirmation() {
     assert_eq!(bench.last_end(), SessionEnd::Replaced);
 }
 
+/// Safety: 26.
 #[test]
 fn panic_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
         let bench = Bench::new();
         let mut last = || {
             bench.deaf.set(deaf);
-            panic!("nobody reads what is written");
+            panic!("written bytes are not read");
         };
         let panicked = catch_unwind(AssertUnwindSafe(|| served(&bench, 5, &mut last)));
         assert!(panicked.is_err());
@@ -251,6 +252,7 @@ fn panic_closes_the_session_or_warns_the_user() {
     }
 }
 
+/// Safety: 26.
 #[test]
 fn failed_start_closes_the_session_or_warns_the_user() {
     for deaf in [false, true] {
@@ -304,7 +306,7 @@ fn silent_device_is_reopened_once_its_first_line_is_closed() {
     });
     assert!(end.result.is_ok() && end.disarmed.is_ok(), "{end:?}");
     let received = handler.received.join("\n");
-    assert!(received.contains("goes on where it was"), "{received}");
+    assert!(received.contains("continues where it was"), "{received}");
     assert_eq!(bench.last_end(), SessionEnd::Goodbye);
 }
 
@@ -339,6 +341,7 @@ fn close_during_an_outage_is_sent_after_it() {
     }
 }
 
+/// Safety: 32.
 #[test]
 fn losing_the_device_warns_of_an_armed_arm() {
     let bench = Bench::new();

@@ -6,13 +6,15 @@ use super::marks::text_of;
 use super::{Action, Steer};
 use crate::named_surfaces::NamedSurface;
 use crate::place::{PlacementChange, SurfaceChange};
+use crate::quantity::{ANGLE, DAMPING, GROUND_DISTANCE, LENGTH, TIME};
 use heightfield::printable_text::printable;
 
 /// The known commands, for messages.
-pub const KNOWN_COMMANDS: &str = "pan EAST NORTH (device mm), pan-m EAST NORTH (ground m), zoom TIMES, \
-     exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction S, damping NS_PER_M, \
-     tip RADIUS (mm), shading smooth|none, texture grain|grating AMPLITUDE WAVELENGTH [DIRECTION], texture none, reset, \
-     clutch on, clutch off, mark TEXT, enter NUMBER; `at SECONDS` before any of them, and before that \
+pub const KNOWN_COMMANDS: &str = "pan EAST NORTH (5mm at the device, 100m on the ground), zoom TIMES, \
+     exaggerate TIMES, surface ice|sand|rock, stiffness TIMES, friction MU [AT_REST], viscous-friction TIME (10ms), \
+     damping DAMPING (2Ns/m), tip RADIUS (2mm), shading smooth|none, \
+     texture grain|grating AMPLITUDE WAVELENGTH (0.1mm 1mm) [DIRECTION (30deg)], texture none, reset, \
+     clutch on, clutch off, mark TEXT, enter NUMBER; `at TIME` (2.5s) before any of them, and before that \
      `on NUMBER` for one device of several";
 
 /// A command and its time.
@@ -30,7 +32,7 @@ pub struct Command {
 #[error("`{line}` is no command ({why}); understood are: {KNOWN_COMMANDS}")]
 pub struct CommandError {
     line: String,
-    why: &'static str,
+    why: String,
 }
 
 /// Max characters of a line in a message.
@@ -48,7 +50,7 @@ pub fn parse(line: &str) -> Result<Option<Command>, CommandError> {
     };
     let (at_s, rest) = timed(line).map_err(refused)?;
     if let Some(text) = mark_in(rest) {
-        let text = text_of(text).map_err(refused)?;
+        let text = text_of(text).map_err(|why| refused(why.to_owned()))?;
         let action = Action::Mark(text);
         return Ok(Some(Command { at_s, action }));
     }
@@ -61,8 +63,8 @@ pub fn parse(line: &str) -> Result<Option<Command>, CommandError> {
         ["enter", number] => number
             .parse()
             .map(Action::Enter)
-            .map_err(|_| "a number is wanted"),
-        ["enter", ..] => Err("it takes the number of a question"),
+            .map_err(|_| "a number is wanted".to_owned()),
+        ["enter", ..] => Err("it takes the number of a question".to_owned()),
         _ => read(&words).map(Action::Steer),
     };
     let action = action.map_err(refused)?;
@@ -75,16 +77,16 @@ fn beginning(line: &str) -> String {
     printable(&beginning)
 }
 
-/// Removes and reads `at SECONDS` at the beginning of a line.
-fn timed(line: &str) -> Result<(Option<f64>, &str), &'static str> {
+/// Removes and reads `at TIME` at the beginning of a line.
+fn timed(line: &str) -> Result<(Option<f64>, &str), String> {
     let Some(rest) = after_word(line, "at") else {
         return Ok((None, line));
     };
     let rest = rest.trim_start();
     let time = rest.split(|c: char| c.is_whitespace() || c == '#').next();
     let time = time.unwrap_or_default();
-    match number(time)? {
-        at_s if at_s < 0.0 => Err("a time is not below zero"),
+    match TIME.read(time)? {
+        at_s if at_s < 0.0 => Err("a time is not below zero".to_owned()),
         at_s => Ok((Some(at_s), rest.get(time.len()..).unwrap_or_default())),
     }
 }
@@ -101,17 +103,10 @@ fn mark_in(line: &str) -> Option<&str> {
     after_word(line, "mark")
 }
 
-fn read(words: &[&str]) -> Result<Steer, &'static str> {
+fn read(words: &[&str]) -> Result<Steer, String> {
     let change = |change| Ok(Steer::Change(change));
     match words {
-        ["pan", east, north] => change(PlacementChange::Pan {
-            east_mm: number(east)?,
-            north_mm: number(north)?,
-        }),
-        ["pan-m", east, north] => change(PlacementChange::PanGround {
-            east_m: number(east)?,
-            north_m: number(north)?,
-        }),
+        ["pan", east, north] => change(pan(east, north)?),
         ["zoom", times] => change(PlacementChange::Zoom(factor(times)?)),
         ["exaggerate", times] => change(PlacementChange::Exaggerate(factor(times)?)),
         ["stiffness", times] => change(PlacementChange::Stiffness(factor(times)?)),
@@ -119,28 +114,56 @@ fn read(words: &[&str]) -> Result<Steer, &'static str> {
             "surface" | "friction" | "viscous-friction" | "damping" | "shading" | "texture",
             ..,
         ] => change(PlacementChange::Surface(surface(words)?)),
-        ["tip", radius] => change(PlacementChange::Tip(number(
-            radius.strip_suffix("mm").unwrap_or(radius),
-        )?)),
+        ["tip", radius] => change(PlacementChange::Tip(LENGTH.read(radius)?)),
         ["reset"] => change(PlacementChange::Reset),
         ["clutch", "on"] => Ok(Steer::Clutch(true)),
         ["clutch", "off"] => Ok(Steer::Clutch(false)),
-        ["pan" | "pan-m", ..] => Err("it takes two numbers"),
-        ["zoom" | "exaggerate" | "stiffness" | "tip", ..] => Err("it takes one number"),
-        ["clutch", ..] => Err("it is on or off"),
-        [] => Err("a command is missing"),
-        _ => Err("no such word"),
+        ["pan", ..] => Err("it takes two lengths".to_owned()),
+        ["pan-m", ..] => Err("pan-m is now pan with a unit, such as pan 100m 0m".to_owned()),
+        ["zoom" | "exaggerate" | "stiffness" | "tip", ..] => Err("it takes one number".to_owned()),
+        ["clutch", ..] => Err("it is on or off".to_owned()),
+        [] => Err("a command is missing".to_owned()),
+        _ => Err("no such word".to_owned()),
+    }
+}
+
+/// A length of a displacement.
+enum Distance {
+    /// At the device, mm.
+    Device(f64),
+    /// On the ground, m.
+    Ground(f64),
+}
+
+fn distance(word: &str) -> Result<Distance, String> {
+    let at_device = LENGTH.read(word).map(Distance::Device);
+    at_device.or_else(|why| {
+        let on_ground = GROUND_DISTANCE.read(word).map(Distance::Ground);
+        on_ground.map_err(|_| format!("{why}; on the ground it is in m, km or ft"))
+    })
+}
+
+/// Reads a displacement: two lengths at the device, or two distances on the ground.
+fn pan(east: &str, north: &str) -> Result<PlacementChange, String> {
+    use Distance::{Device, Ground};
+    let on_ground = |east_m, north_m| Ok(PlacementChange::PanGround { east_m, north_m });
+    match (distance(east)?, distance(north)?) {
+        (Device(east_mm), Device(north_mm)) => Ok(PlacementChange::Pan { east_mm, north_mm }),
+        (Ground(east_m), Ground(north_m)) => on_ground(east_m, north_m),
+        (Ground(east_m), Device(0.0)) => on_ground(east_m, 0.0),
+        (Device(0.0), Ground(north_m)) => on_ground(0.0, north_m),
+        _ => Err("one length is at the device, the other on the ground".to_owned()),
     }
 }
 
 /// Reads a change of the surface.
-fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
+fn surface(words: &[&str]) -> Result<SurfaceChange, String> {
     let number = |word| number(word).map(|number| number as f32);
     Ok(match words {
         ["surface", name] => {
             SurfaceChange::Named(NamedSurface::find(name).ok_or("it is ice, sand or rock")?)
         }
-        ["surface", ..] => return Err("it is ice, sand or rock"),
+        ["surface", ..] => return Err("it is ice, sand or rock".to_owned()),
         ["friction", mu] => SurfaceChange::Friction {
             dynamic_mu: number(mu)?,
             static_mu: number(mu)?,
@@ -149,48 +172,51 @@ fn surface(words: &[&str]) -> Result<SurfaceChange, &'static str> {
             dynamic_mu: number(mu)?,
             static_mu: number(at_rest)?,
         },
-        ["viscous-friction", viscous_s] => SurfaceChange::ViscousFriction(number(viscous_s)?),
-        ["damping", ns_per_m] => SurfaceChange::Damping(number(ns_per_m)?),
+        ["viscous-friction", viscous_s] => {
+            SurfaceChange::ViscousFriction(TIME.read_single(viscous_s)?)
+        }
+        ["damping", ns_per_m] => SurfaceChange::Damping(DAMPING.read_single(ns_per_m)?),
         ["shading", "none"] => SurfaceChange::Shading(Shading::None),
         ["shading", "smooth"] => SurfaceChange::Shading(Shading::Smooth),
         ["texture", "none"] => SurfaceChange::Texture(Texture::NONE),
         ["texture", "grain", amplitude, wavelength] => SurfaceChange::Texture(Texture {
             pattern: Pattern::Grain,
-            amplitude_mm: number(amplitude)?,
-            wavelength_mm: number(wavelength)?,
+            amplitude_mm: LENGTH.read_single(amplitude)?,
+            wavelength_mm: LENGTH.read_single(wavelength)?,
             ..Texture::NONE
         }),
         ["texture", "grating", amplitude, wavelength, direction @ ..] => {
             SurfaceChange::Texture(Texture {
                 pattern: Pattern::Grating,
-                amplitude_mm: number(amplitude)?,
-                wavelength_mm: number(wavelength)?,
+                amplitude_mm: LENGTH.read_single(amplitude)?,
+                wavelength_mm: LENGTH.read_single(wavelength)?,
                 direction_deg: match direction {
                     [] => 0.0,
-                    [degrees] => number(degrees)?,
-                    _ => return Err("a grating takes two or three numbers"),
+                    [degrees] => ANGLE.read_single(degrees)?,
+                    _ => return Err("a grating takes two or three numbers".to_owned()),
                 },
                 seed: 0,
             })
         }
-        ["friction", ..] => return Err("it takes one or two numbers"),
-        ["shading", ..] => return Err("it is smooth or none"),
+        ["friction", ..] => return Err("it takes one or two numbers".to_owned()),
+        ["shading", ..] => return Err("it is smooth or none".to_owned()),
         ["texture", ..] => {
-            return Err("it is none, or grain or grating with an amplitude and a wavelength, mm");
+            let why = "it is none, or grain or grating with an amplitude and a wavelength";
+            return Err(why.to_owned());
         }
-        _ => return Err("it takes one number"),
+        _ => return Err("it takes one number".to_owned()),
     })
 }
 
-fn number(word: &str) -> Result<f64, &'static str> {
+fn number(word: &str) -> Result<f64, String> {
     let number = word.parse().ok().filter(|number: &f64| number.is_finite());
-    number.ok_or("a number is wanted")
+    number.ok_or_else(|| "a number without a unit is wanted".to_owned())
 }
 
-fn factor(word: &str) -> Result<f64, &'static str> {
+fn factor(word: &str) -> Result<f64, String> {
     match number(word)? {
         times if times > 0.0 => Ok(times),
-        _ => Err("a factor is above zero"),
+        _ => Err("a factor is above zero".to_owned()),
     }
 }
 
@@ -209,13 +235,15 @@ mod tests {
             east_mm: 5.0,
             north_mm: -0.5,
         };
-        let pan_m = PlacementChange::PanGround {
+        let west = PlacementChange::PanGround {
             east_m: -1e3,
             north_m: 0.0,
         };
         for (line, at_s, steer) in [
             ("pan 5 -0.5", None, Steer::Change(pan)),
-            ("  pan-m -1e3 0 # west", None, Steer::Change(pan_m)),
+            ("pan 5mm -0.05cm", None, Steer::Change(pan)),
+            ("  pan -1e3m 0m # west", None, Steer::Change(west)),
+            ("pan -1km 0", None, Steer::Change(west)),
             (
                 "at 2.5 zoom 2",
                 Some(2.5),
@@ -259,9 +287,29 @@ mod tests {
                 None,
                 of_surface(SurfaceChange::ViscousFriction(0.01)),
             ),
+            (
+                "at 2500ms viscous-friction 10ms",
+                Some(2.5),
+                of_surface(SurfaceChange::ViscousFriction(0.01)),
+            ),
             ("tip 2", None, Steer::Change(PlacementChange::Tip(2.0))),
             ("tip .5mm", None, Steer::Change(PlacementChange::Tip(0.5))),
             ("damping 2", None, of_surface(SurfaceChange::Damping(2.0))),
+            (
+                "damping 2Ns/m",
+                None,
+                of_surface(SurfaceChange::Damping(2.0)),
+            ),
+            (
+                "texture grain 100um 1.5mm",
+                None,
+                of_surface(SurfaceChange::Texture(Texture {
+                    pattern: Pattern::Grain,
+                    amplitude_mm: 0.1,
+                    wavelength_mm: 1.5,
+                    ..Texture::NONE
+                })),
+            ),
             (
                 "shading smooth",
                 None,
@@ -273,7 +321,7 @@ mod tests {
                 of_surface(SurfaceChange::Texture(Texture::NONE)),
             ),
             (
-                "texture grating .1 1.5 30",
+                "texture grating .1mm 1.5 30deg",
                 None,
                 of_surface(SurfaceChange::Texture(Texture {
                     pattern: Pattern::Grating,
@@ -338,11 +386,16 @@ mod tests {
             ("zoom", "one number"),
             ("zoom 2 3", "one number"),
             ("zoom two", "a number"),
+            ("stiffness 0.5N/mm", "without a unit"),
             ("zoom 0", "above zero"),
             ("zoom -1", "above zero"),
             ("zoom inf", "a number"),
-            ("pan 5", "two numbers"),
-            ("pan 5 nan", "a number"),
+            ("pan 5", "two lengths"),
+            ("pan 5 nan", "a finite number in mm"),
+            ("pan 5in 0", "on the ground it is in m, km or ft"),
+            ("pan 5mm 3m", "the other on the ground"),
+            ("pan-m 100 0", "now pan with a unit, such as pan 100m 0m"),
+            ("tip 2m", "mm, cm, um"),
             ("surface", "ice, sand or rock"),
             ("surface mud", "ice, sand or rock"),
             ("friction", "one or two numbers"),

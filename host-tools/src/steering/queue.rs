@@ -246,6 +246,7 @@ mod tests {
         Action::Steer(Steer::Change(change))
     }
 
+    /// Safety: 29.
     #[cfg(unix)]
     #[test]
     fn endless_command_line_is_cut_and_ends_input() {

@@ -1,4 +1,4 @@
-//! Random numbers by place: the same place and seed give the same number.
+//! Random numbers by place: the same place and seed yield the same number.
 
 /// Mixes a seed and a place into 64 uniform bits (the finaliser of SplitMix64).
 pub(super) fn hash(seed: u64, column: i64, row: i64) -> u64 {

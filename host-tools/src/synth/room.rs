@@ -14,7 +14,7 @@ const MAX_DEFLATE_RATIO: u64 = 1032;
 
 /// A disk with too little room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("it takes {:.1} GB and {:.1} GB are free there", *needed as f64 / 1e9, *free as f64 / 1e9)]
+#[error("it needs {:.1} GB and {:.1} GB are free there", *needed as f64 / 1e9, *free as f64 / 1e9)]
 pub struct NoRoom {
     /// Size of the file, or a lower bound, bytes.
     pub needed: u64,

@@ -29,25 +29,24 @@ impl Terrain<'_> {
     /// into four tiles, which the device stores anyway.
     #[must_use]
     pub fn with_fallback(&self, scene: Scene, reach_mm: [f64; 4]) -> Scene {
-        let mut scene = Scene {
-            fallback: match self.is_small() {
-                true => None,
-                false => self.fallback_of(&scene, reach_mm, (scene.home.column(), NEAR_SHIFT)),
-            },
-            ..scene
+        let fallback = match self.is_small() {
+            true => None,
+            false => self.fallback_of(&scene, reach_mm, (scene.home.column(), NEAR_SHIFT)),
         };
-        scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
-        scene
+        self.set_fallback(scene, fallback)
     }
 
     /// Returns a scene with a fallback as [`Self::with_fallback`], for a change of placement in
     /// contact: its near tile is around the touched cell, and a small terrain has a fallback, too.
     #[must_use]
     pub fn with_fallback_around(&self, scene: Scene, reach_mm: [f64; 4], touched: Cell) -> Scene {
-        let mut scene = Scene {
-            fallback: self.fallback_of(&scene, reach_mm, (touched, NEAR_SHIFT_IN_CONTACT)),
-            ..scene
-        };
+        let fallback = self.fallback_of(&scene, reach_mm, (touched, NEAR_SHIFT_IN_CONTACT));
+        self.set_fallback(scene, fallback)
+    }
+
+    /// Returns the scene with this fallback, and with the epoch of both.
+    fn set_fallback(&self, mut scene: Scene, fallback: Option<Fallback>) -> Scene {
+        scene.fallback = fallback;
         scene.epoch = identity::epoch(self.fingerprint(), self.grid(), self.scale(), &scene);
         scene
     }

@@ -66,7 +66,7 @@ pub enum TerrainError {
         /// The scale that causes it.
         scale: Scale,
     },
-    /// A tip that is no ball, or a ball so large that tiles would take too long.
+    /// A tip that is no ball, or a ball too large for the duration of a tile.
     #[error(
         "a tip of {} mm: {:.1} cells of level {level}, where 0 to {} can be rendered",
         tip.tip_mm, tip.cells, tip::MAX_CELLS
@@ -488,7 +488,7 @@ impl<'r> Terrain<'r> {
         );
         tracing::warn!(
             "sample {column}, {row} of level {}, from the south-west, differs from a neighbour by {cells:.3e} cells, at most {MAX_STEP_CELLS} can be rendered: \
-             its tile, and each that is as steep, is a hole; scale the heights down with --exaggeration, or fill the sample",
+             its tile, and each that is as steep, is no-data; scale the heights down with --exaggeration, or fill the sample",
             self.level
         );
     }

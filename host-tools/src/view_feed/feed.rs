@@ -255,7 +255,7 @@ impl<'t> ViewFeed<'t> {
     }
 
     /// Waits until the viewer has read most of its messages: only for recordings, which nothing
-    /// else waits for. Returns false if the viewer is gone.
+    /// else waits for. Returns false if the viewer has ended.
     pub fn wait_for_room(&self) -> bool {
         self.queue.wait_for_room(Duration::from_secs(60))
     }

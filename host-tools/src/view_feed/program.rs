@@ -78,7 +78,7 @@ impl Program {
         let rrd = self
             .rrd
             .iter()
-            .flat_map(|rrd| [OsStr::new("--rrd"), rrd.as_os_str()]);
+            .flat_map(|rrd| [OsStr::new("-o"), rrd.as_os_str()]);
         Command::new(&self.path)
             .args(rrd)
             .stdin(Stdio::piped())

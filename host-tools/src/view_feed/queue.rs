@@ -73,7 +73,7 @@ impl Queue {
     }
 
     /// Waits for at most `wait` until there is room: only for a recording, which nothing else waits
-    /// for. Returns false if the viewer is gone.
+    /// for. Returns false if the viewer has ended.
     pub(super) fn wait_for_room(&self, wait: Duration) -> bool {
         let until = Instant::now() + wait;
         let is_full = || self.waiting.load(Ordering::Acquire) > self.limit / 2;
@@ -109,7 +109,7 @@ impl Writer {
             let written = write(&mut to, &message).and_then(|_| Ok(to.flush()?));
             self.waiting.fetch_sub(size, Ordering::AcqRel);
             if let Err(why) = written {
-                tracing::info!("the viewer takes no more: {why}");
+                tracing::info!("the viewer does not read any more: {why}");
                 self.is_gone.store(true, Ordering::Release);
                 return;
             }

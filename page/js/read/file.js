@@ -28,5 +28,5 @@ function reader(name, bytes) {
   if (/\.hgt$/i.test(name)) return hgt;
   const text = new TextDecoder("latin1").decode(bytes.subarray(0, 64));
   if (/^\s*(ncols|nrows)\s/i.test(text)) return asc;
-  throw new ReadError(`${name}: its kind is not known here. Drop a ${KINDS}; \`cargo xtask demo --touch FILE\` opens many more.`);
+  throw new ReadError(`${name}: its format is not supported. Drop a ${KINDS}; \`cargo xtask demo --touch FILE\` opens many more.`);
 }

@@ -43,7 +43,7 @@ export class Camera {
     this.right = [cy, -sy, 0];
     this.up = cross(this.right, this.forward);
     this.eye = minus(this.centre, times(this.forward, this.distance));
-    // In a narrow window the sides must be visible, too.
+    // In a narrow window the sides must also be visible.
     this.tan = this.#tan * Math.max(1, 1.25 / aspect);
     this.aspect = aspect;
     const [near, far] = [this.distance / 20, this.distance * 4];

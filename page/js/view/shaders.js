@@ -46,7 +46,7 @@ void main() {
   float light = texel.b;
   float direct = max(dot(normal, normalize(sun)), 0.0);
   vec3 lit = base * (vec3(1.0, .93, .80) * 1.35 * direct * smoothstep(.25, .85, light) + vec3(.50, .58, .70) * (0.34 + 0.5 * light));
-  // The pen's own shadow says how far above the ground it is.
+  // The pen's own shadow shows its height above the ground.
   float above = max(foot.z - place.z, 0.0);
   float spot = exp(-dot(place.xy - foot.xy, place.xy - foot.xy) / (4.0 + above * above * 0.4));
   lit *= 1.0 - 0.75 * spot / (1.0 + above * 0.12);

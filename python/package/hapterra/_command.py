@@ -87,7 +87,7 @@ def _text(value: Any) -> str:
 
 
 def run(*words: Word, program: list[str] | None = None) -> str:
-    """Runs the command, or another program, to its end and returns what it prints.
+    """Runs the command, or another program, to its end and returns its output.
 
     Ctrl-C also ends the command, and waits for its end.
 

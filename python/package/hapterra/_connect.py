@@ -141,7 +141,7 @@ class Device:
         kinds = ("usb", "native", "emulated")
         if name not in kinds and not name.startswith(("usb:", "tcp:", "emulated:")):
             known = '"usb", "usb:SERIAL", "tcp:HOST:PORT", "native", "emulated" or "emulated:ELF"'
-            raise ValueError(f"{name!r} is no device: give {known}")
+            raise ValueError(f"{name!r} is no device: use {known}")
         if name.startswith("emulated") and record is not None and Path(record).suffix == ".parquet":
             raise ValueError("an emulated board records CSV: name a file that ends in .csv")
         self.name = name
@@ -174,20 +174,20 @@ class Device:
         ----------
         terrain : a Terrain, or a source that ``hapterra run`` opens: a file, a folder, a URL. A
         Terrain
-            is written to a file of 8 bytes a sample; give the path of a large one.
+            is written to a file of 8 bytes a sample; pass the path of a large one.
         surface : Surface, or one of the command: "ice", "sand", "rock" or a file, optional
-            Materials of a surface cannot be loaded: give ``materials=``, a file, and the file of
+            Materials of a surface cannot be loaded: pass ``materials=``, a file, and the file of
             its classes as the surface.
         options
             Options of ``hapterra run`` with underscores: ``at=(x, y)``, ``scale="5m/mm"``,
             ``exaggeration="auto"``, ``tip="2mm"``, ``duration="60s"``. A Terrain has its own
-            scale. If neither ``tip=`` nor ``Terrain.with_tip`` gives a radius, the tip is the ball
+            scale. If neither ``tip=`` nor ``Terrain.with_tip`` sets a radius, the tip is the ball
             that ``hapterra run`` chooses, while ``Contact`` has a point.
         """
         if self._session is not None:
             raise DeviceError("a terrain is touched: disarm() before another is loaded")
         if "device" in options:
-            raise ValueError("load() takes no device=: the device is that of connect()")
+            raise ValueError("load() accepts no device=: the device is that of connect()")
         words: dict[str, Any] = {}
         if isinstance(terrain, Terrain):
             file, words = terrain._write(Path(self._folder) / "terrain.npy")
@@ -197,7 +197,7 @@ class Device:
         self._surface = parameters.params()
         if self._surface.pop("materials"):
             raise ValueError(
-                "materials of a surface cannot be loaded: give materials=, a file, and the file of"
+                "materials of a surface cannot be loaded: pass materials=, a file, and the file of"
                 " its classes as the surface"
             )
         if isinstance(surface, Surface):
@@ -245,7 +245,7 @@ class Device:
                     continue
                 number, text = question
                 if not (ask or ask_at_terminal)(text):
-                    hint = "" if ask else " by Enter at a terminal: elsewhere give arm() an ask="
+                    hint = "" if ask else " by Enter at a terminal: elsewhere pass arm() an ask="
                     raise session.error(f"not armed: the question was not answered{hint}")
                 session.send(f"enter {number}")
                 until = time.monotonic() + timeout
@@ -355,11 +355,11 @@ class Device:
 
     def command(self, line: str) -> None:
         """Sends a command of ``hapterra run`` that changes the placement, such as "zoom 2" or
-        "pan 5 0", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
+        "pan 5mm 0mm", and waits until it is done. Raises DeviceError if it is refused. "reset" sets
         ``params`` to the loaded values; commands of the surface are refused."""
         first = [*line.partition("#")[0].split(), ""][0]
         if first in _REPLACEMENTS:
-            raise DeviceError(f"{line!r} is not given as a command: {_REPLACEMENTS[first]}")
+            raise DeviceError(f"{line!r} is not accepted as a command: {_REPLACEMENTS[first]}")
         self._change(line, self._surface if first == "reset" else {})
 
     def _change(self, line: str, changed: dict[str, Any]) -> None:
@@ -408,7 +408,7 @@ class Device:
         if not mark and len(session.refused) > refused:
             raise DeviceError(session.refused[-1])
         if mark.get("marked_tick") is None:
-            raise session.error(f"the device has not said which tick {text!r} marks")
+            raise session.error(f"the device has not reported which tick {text!r} marks")
         return Mark(text, mark["marked_tick"], mark["marked_t_s"], mark["host_unix_s"])
 
     def _require_session(self) -> Session:

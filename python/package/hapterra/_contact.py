@@ -77,7 +77,7 @@ def arguments(path_mm: npt.ArrayLike, t: npt.ArrayLike | None) -> tuple[bytes, b
     """Returns a path and its times as arguments of the compiled part."""
     path = np.asarray(path_mm, "=f8")
     if path.ndim != 2 or path.shape[1] != 3:
-        raise ValueError(f"the path has the shape {path.shape}: give (N, 3), east, north, up")
+        raise ValueError(f"the path has the shape {path.shape}: use (N, 3), east, north, up")
     times = None if t is None else np.asarray(t, "=f8")
     if times is not None and times.shape != path.shape[:1]:
         raise ValueError(f"t has the shape {times.shape}, and the path has {len(path)} rows")
@@ -96,8 +96,8 @@ class Contact:
         Steps a second, 1000 to 10000 in whole thousands; damping and viscous friction use it.
 
     The first position should be above the terrain: a path that begins below it has the state
-    BELOW_GROUND, and no force until the HIP has been above. A contact belongs to one hand: give
-    each thread its own. A terrain may be shared.
+    BELOW_GROUND, and no force until the HIP has been above. A contact belongs to one hand: use
+    one for each thread. A terrain may be shared.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""pandas, only where a DataFrame is wanted."""
+"""pandas, imported only for a DataFrame."""
 
 from __future__ import annotations
 

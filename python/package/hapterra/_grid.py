@@ -60,12 +60,12 @@ class Grid:
         if ground_unit == _DEGREES:
             raise ValueError(
                 "cells are degrees, which are no squares on the ground: reproject to a system in"
-                " metres, or give height_mm_per_unit to touch the samples as squares"
+                " metres, or pass height_mm_per_unit to touch the samples as squares"
             )
         east, north = self.cell
         if not np.isclose(east, north, rtol=1e-3):
             raise ValueError(
-                f"cells are {east:g} by {north:g}: resample to squares, or give height_mm_per_unit"
+                f"cells are {east:g} by {north:g}: resample to squares, or pass height_mm_per_unit"
                 " to touch the samples as squares"
             )
         ground = _metres("ground", "coordinates", ground_unit)
@@ -75,13 +75,13 @@ class Grid:
 def _metres(word: str, what: str, unit: str | None) -> float:
     if unit is None:
         raise ValueError(
-            f'the data does not state the unit of its {what}: give {word}_unit="m", or'
+            f'the data does not state the unit of its {what}: pass {word}_unit="m", or'
             " height_mm_per_unit"
         )
     known = _METRES.get(_unit(unit) or "")
     if known is None:
         units = ", ".join(_METRES)
-        raise ValueError(f"{word}_unit is {unit!r}: give one of {units}, or height_mm_per_unit")
+        raise ValueError(f"{word}_unit is {unit!r}: use one of {units}, or height_mm_per_unit")
     return known
 
 
@@ -139,7 +139,7 @@ def _dimension(da: Any, word: str, axis: str, names: set[str]) -> Any:
 
     found = [name for name in da.dims if matches(name)]
     if len(found) != 1:
-        raise ValueError(f"which of the dimensions {da.dims} is {word}? give {word}=")
+        raise ValueError(f"which of the dimensions {da.dims} is {word}? pass {word}=")
     return found[0]
 
 
@@ -147,12 +147,12 @@ def _spacing(da: Any, name: str) -> tuple[float, int]:
     """Returns the spacing of regular coordinates, and 1 if they rise or -1 if they fall."""
     if name not in da.coords:
         raise ValueError(
-            f"the dimension {name} has no coordinates: give them with assign_coords, or use"
+            f"the dimension {name} has no coordinates: set them with assign_coords, or use"
             " Terrain(da.values, cell_mm=, origin=)"
         )
     places = np.asarray(da[name].values, dtype="f8")
     if len(places) < 2:
-        raise ValueError(f"the dimension {name} has {len(places)} samples: give 2 at least")
+        raise ValueError(f"the dimension {name} has {len(places)} samples: at least 2 are required")
     step = (places[-1] - places[0]) / (len(places) - 1)
     even = places[0] + step * np.arange(len(places))
     if not (step and np.abs(places - even).max() <= 0.01 * abs(step)):

@@ -17,11 +17,11 @@ class Params:
     stiffness, N/mm; friction and static_friction; viscous_friction, s; damping, N·s/m; shading,
     "none" or "smooth"; texture, "none", ("grain", AMPLITUDE, WAVELENGTH) or ("grating", AMPLITUDE,
     WAVELENGTH, DIRECTION), mm and degrees. Setting one returns when the surface has changed; the
-    force then turns to that of the new surface over half a second. What the device refuses is a
-    DeviceError, and the surface stays as it was. Setting friction sets static_friction, too. A
-    change that is not confirmed in time may still take effect: its value is unknown then, and reading
-    it a DeviceError, until it is set again. Stiffness is set by its ratio to what it was, so an
-    unknown one takes ``device.command("reset")``.
+    force then turns to that of the new surface over half a second. If the device refuses a value,
+    a DeviceError is raised and the surface is unchanged. Setting friction also sets
+    static_friction. A change that is not confirmed in time may still take effect: its value is
+    unknown then, and reading it raises a DeviceError, until it is set again. Stiffness is set by
+    its ratio to the value before, so an unknown one requires ``device.command("reset")``.
     """
 
     stiffness: float
@@ -48,8 +48,8 @@ class Params:
     def _known(self, name: str) -> Any:
         value = self.__dict__["_surface"][name]
         if value is None:
-            reset = 'device.command("reset") puts the surface back to what was loaded'
-            raise DeviceError(f"{name} is not known, as its last change was not confirmed: {reset}")
+            reset = 'device.command("reset") restores the loaded surface'
+            raise DeviceError(f"{name} is unknown, as its last change was not confirmed: {reset}")
         return value
 
     def __setattr__(self, name: str, value: Any) -> None:

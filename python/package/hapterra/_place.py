@@ -27,7 +27,7 @@ def ground_m_per_mm(scale: str | float | None) -> float | None:
     except ValueError:
         metres = None
     if not found or metres is None:
-        raise ValueError(f'scale is {scale!r}: give ground a millimetre, as "100 m/mm" or "1 km/mm"')
+        raise ValueError(f'scale is {scale!r}: use ground per millimetre, as "100 m/mm" or "1 km/mm"')
     return metres * (1000 if found[2] == "km" else 1)
 
 
@@ -42,14 +42,14 @@ def pair(name: str, values: Pair) -> tuple[float, float]:
     """Returns two numbers."""
     numbers = tuple(map(float, values))
     if len(numbers) != 2:
-        raise ValueError(f"{name} has {len(numbers)} numbers: give 2")
+        raise ValueError(f"{name} has {len(numbers)} numbers: pass 2")
     return numbers[0], numbers[1]
 
 
 def is_lonlat(crs: str | None) -> bool:
     """Returns True if coordinates are longitude and latitude, and not the terrain's own."""
     if crs not in (None, "lonlat"):
-        raise ValueError(f'crs is {crs!r}: give "lonlat", or leave it out for the terrain\'s own')
+        raise ValueError(f'crs is {crs!r}: use "lonlat", or leave it out for the terrain\'s own')
     return crs == "lonlat"
 
 
@@ -135,7 +135,7 @@ def _span(
     if not 0 <= middle <= last:
         raise ValueError(f"{at} is outside of the terrain")
     if not 1 <= cells < 2**31:
-        raise ValueError(f"size_mm is {cells:g} cells: give one at least, millimetres of the hand")
+        raise ValueError(f"size_mm is {cells:g} cells: use at least one, in device millimetres")
     begin = math.floor(middle - cells / 2 + 0.5)
     end = min(max(begin + math.floor(cells + 0.5), 1), last)
     return min(max(begin, 0), end - 1), end
@@ -144,6 +144,6 @@ def _span(
 def _refuse_lonlat(lonlat: bool) -> None:
     if lonlat:
         raise ValueError(
-            'the coordinates of an array are its own: leave crs="lonlat" out, or take Terrain.open,'
-            " which knows projections"
+            'the coordinates of an array are its own: leave crs="lonlat" out, or use Terrain.open,'
+            " which supports projections"
         )

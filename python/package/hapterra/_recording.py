@@ -77,7 +77,7 @@ class Recording:
         if terrain is None:
             terrain = self.settings.get("terrain", {}).get("file")
         if terrain is None:
-            raise ValueError("the recording does not say on which terrain: give terrain=")
+            raise ValueError("the recording does not name its terrain: pass terrain=")
         folder = None
         if output is None:
             folder = tempfile.TemporaryDirectory(prefix="hapterra-")

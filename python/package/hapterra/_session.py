@@ -36,7 +36,7 @@ _CONFIRM_TIMEOUT_S = 20.0
 #: Time-out for the command's last lines after the board is disarmed, s: a viewer that still runs
 #: keeps standard error open.
 _STDERR_TIMEOUT_S = 1.0
-#: Interval of checks whether something has changed, s.
+#: Interval of checks for a change, s.
 _POLL_INTERVAL_S = 0.02
 #: Lines of the command that an error may quote.
 _MAX_LINES = 200
@@ -47,7 +47,7 @@ _STATUS_LINE = re.compile(r"view \d|the view stays as it was|(?!recording)[a-z]+
 
 
 class DeviceError(CommandError):
-    """A device that cannot be armed, has refused a request, or is gone."""
+    """A device that cannot be armed, has refused a request, or is disconnected."""
 
 
 class NotDisarmedError(DeviceError):
@@ -56,7 +56,7 @@ class NotDisarmedError(DeviceError):
 
 
 def refuse_in_fork(pid: int) -> None:
-    """Refuses a fork's request to a session of its parent, whose state the fork cannot know."""
+    """Refuses a fork's request to a session of its parent, whose state is unknown to the fork."""
     if os.getpid() != pid:
         raise DeviceError(
             "this process is a fork, and the arm is driven by the process that made it: disarm() there"
@@ -72,7 +72,7 @@ class Buffer(Generic[_T]):
 
     def __init__(self, size: int) -> None:
         if size < 1:
-            raise ValueError(f"buffer={size}: give a number of items from 1")
+            raise ValueError(f"buffer={size}: use a number of items from 1")
         self._items: queue.SimpleQueue[_T] = queue.SimpleQueue()
         self._size, self._open = size, True
         self.dropped = 0
@@ -109,7 +109,7 @@ class Session:
     words : the subcommand and its arguments.
     on_event : called with each event by the thread that reads them, and at last with one of the
         kind "over".
-    is_quiet : pass on only what a person has to do or is warned of.
+    is_quiet : pass on only instructions and warnings.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Session:
         self.fault: int | None = None
         #: The current placement, counted from 0.
         self.view = -1
-        #: Number of the open question and its lines; number of the last one that was taken.
+        #: Number of the open question and its lines; number of the last one that was fetched.
         self._question: tuple[int, list[str]] | None = None
         self._taken: int | None = None
         #: The last lines about arming.
@@ -229,7 +229,7 @@ class Session:
 
     @property
     def asks(self) -> bool:
-        """Returns True if there is an open question that was not taken."""
+        """Returns True if there is an open question that was not fetched."""
         question = self._question
         return question is not None and question[0] != self._taken
 

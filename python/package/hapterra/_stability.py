@@ -48,8 +48,8 @@ def stability(
         A row a trial. ``tick_hz``, ``damping_ns_per_m``, ``controller`` (passivity, True or False),
         ``grasp``, ``stiffness_n_per_mm``, ``delay_us``, ``arm_friction`` and the texture are what was tried;
         ``press`` is the verdict on a pressed surface, ``swing_mm`` and ``swings_hz`` its limit cycle,
-        ``fault`` what tripped; ``given_mj_at_...`` is the energy, mJ, that a tap at a speed got, and
-        ``ramp_...`` and ``clutch_...`` are the same while the force comes in. ``attrs["summary"]``
+        ``fault`` what tripped; ``given_mj_at_...`` is the energy, mJ, that a tap at a speed gained, and
+        ``ramp_...`` and ``clutch_...`` are the same while the force ramps up. ``attrs["summary"]``
         is the text that the command prints.
 
     Raises

@@ -68,7 +68,7 @@ class Terrain:
         materials: npt.ArrayLike | None = None,
     ) -> None:
         if origin not in _SOUTH_FIRST:
-            raise ValueError(f'origin is {origin!r}: give "upper" (north first) or "lower"')
+            raise ValueError(f'origin is {origin!r}: use "upper" (north first) or "lower"')
         samples = _samples(heights)
         if materials is not None:
             materials = _materials(materials, samples.shape)
@@ -198,7 +198,7 @@ class Terrain:
             return self._native
         if self._ground is None:
             raise ValueError(
-                "the terrain is of an array without coordinates: take Terrain.open, from_xarray or"
+                "the terrain is of an array without coordinates: use Terrain.open, from_xarray or"
                 " from_rasterio"
             )
         return self._ground
@@ -221,9 +221,9 @@ class Terrain:
 
         Row order and cell size are those of its coordinates, units those of ``attrs["units"]``,
         and ``attrs["_FillValue"]`` marks no-data. ``source`` of the result reports them. Properties
-        that are not stated must be given: ``x`` and ``y`` name the dimensions, ``ground_unit`` and
-        ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` takes the place
-        of both units and of the exaggeration.
+        that are not stated must be passed: ``x`` and ``y`` name the dimensions, ``ground_unit`` and
+        ``height_unit`` are "m", "km", "ft" and the like, and ``height_mm_per_unit`` replaces both
+        units and the exaggeration.
         """
         sizing = GridScale(cell_mm, exaggeration, height_mm_per_unit, ground_unit, height_unit)
         return cls._from_grid(of_xarray(da, x, y), sizing)
@@ -293,7 +293,7 @@ class Terrain:
         scale."""
         if self._has_materials:
             raise ValueError(
-                "materials of a Terrain cannot be loaded: give materials=, a file, and surface=, a file of its classes"
+                "materials of a Terrain cannot be loaded: pass materials=, a file, and surface=, a file of its classes"
             )
         rows, columns = self.shape
         if rows * columns > _MAX_WRITTEN:
@@ -325,9 +325,9 @@ class Terrain:
 def _samples(heights: npt.ArrayLike) -> npt.NDArray[Any]:
     samples: Any = heights if isinstance(heights, np.ndarray) else np.asarray(heights)
     if samples.dtype.kind not in "fiub":
-        raise TypeError(f"heights are of {samples.dtype}: give real numbers")
+        raise TypeError(f"heights are of {samples.dtype}: use real numbers")
     if samples.ndim != 2:
-        raise ValueError(f"heights have the shape {samples.shape}: give (rows, columns)")
+        raise ValueError(f"heights have the shape {samples.shape}: use (rows, columns)")
     if isinstance(samples, np.ma.MaskedArray):
         is_whole = not np.ma.getmaskarray(samples).any()
         samples = samples.data if is_whole else np.ma.filled(samples.astype("f8"), np.nan)

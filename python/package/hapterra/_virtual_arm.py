@@ -27,7 +27,7 @@ ARM_STEP = np.dtype(
 
 
 class VirtualArm:
-    """A virtual Phantom Premium 1.5 that a hand holds, for experiments without hardware.
+    """A virtual Phantom Premium 1.5 in a hand, for experiments without hardware.
 
     ::
 
@@ -65,7 +65,7 @@ class VirtualArm:
         names = ("hand_mass", "arm_stiffness", "arm_damping", "grip_stiffness", "grip_damping")
         for name, number in zip(names, hand):
             if not 0 < number < 1e5:
-                raise ValueError(f"{name} is {number}: give a number above 0")
+                raise ValueError(f"{name} is {number}: use a number above 0")
         self._native = _native.VirtualArm((east, north, up), hand)
         self.home_mm = (east, north, up)
 

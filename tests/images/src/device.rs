@@ -181,7 +181,7 @@ impl<'t> Device<'t> {
             machine, session, ..
         } = self;
         drop(session);
-        let machine = Rc::try_unwrap(machine).ok().expect("nobody else has it");
+        let machine = Rc::try_unwrap(machine).ok().expect("it has no other owner");
         let mut machine = machine.into_inner();
         machine.reset(cause);
         machine
@@ -229,7 +229,7 @@ impl<'t> Device<'t> {
             };
             self.session
                 .poll(Duration::from_millis(1), &mut on_event)
-                .expect("goes on");
+                .expect("it continues");
         }
     }
 

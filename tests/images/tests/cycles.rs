@@ -80,7 +80,7 @@ fn compared_scenes_do_not_exceed_recorded_cycles() {
 
 /// `cargo xtask cycles` runs this; `--write` writes the table.
 #[test]
-#[ignore = "takes minutes: cargo xtask cycles"]
+#[ignore = "runs for minutes: cargo xtask cycles"]
 fn tick_states_do_not_exceed_recorded_cycles() {
     let Some(board) = CountingBoard::found() else {
         return;

@@ -1,7 +1,7 @@
 //! Runs the closed-loop campaign: `hapterra-campaign --seconds N --seed S`, or one segment of it
 //! with `--segment K [--effects]`. `--link` selects the campaign of link faults. `cargo xtask
-//! campaign` builds this with full optimisation and writes the report to `log/campaign.md` or
-//! `log/link-campaign.md`.
+//! campaign` builds this with full optimisation and writes the report `campaign.md` or
+//! `link-campaign.md` into the folder of the month in `log/`.
 
 #![forbid(unsafe_code)]
 

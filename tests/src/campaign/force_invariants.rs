@@ -43,7 +43,7 @@ pub struct ForceChecks {
     before_n: Vec3,
     /// The contact in progress, if all of it is known.
     contact: Option<ContactEnergy>,
-    /// The most energy that a contact has given to the tip with the controller on, mJ.
+    /// The max energy that a contact has added to the tip with the controller on, mJ.
     pub max_gained_mj: f32,
     /// Ticks of these contacts.
     pub watched_ticks: u64,
@@ -140,7 +140,7 @@ impl ForceChecks {
         }
     }
 
-    /// Checks that no force points away from the proxy: friction holds and does not push. Shading
+    /// Checks that no force points away from the proxy: friction resists and does not push. Shading
     /// turns a force by 60° at most.
     fn check_no_pull(&self, sample: &TickRecord, displacement_mm: Vec3) -> Result<(), String> {
         let [high_mm, _] = self.surfaces.relief();
@@ -174,7 +174,7 @@ impl ForceChecks {
         max_gain_mj.min(MAX_SHADED_MJ)
     }
 
-    /// Checks that with the controller on no contact gives more energy than it received, at any
+    /// Checks that with the controller on no contact returns more energy than it received, at any
     /// time, and that the tip does not swing, within the allowance for shading and texture.
     /// `shares` are those of the last tick and of this one.
     fn check_no_energy_gain(
@@ -237,7 +237,9 @@ impl ForceChecks {
         };
         match contact.gained_mj <= GAINED_MJ + shading + textures {
             true => Ok(()),
-            false => Err(format!("the ground gave {contact:?}: {sample:?}")),
+            false => Err(format!(
+                "the contact added too much energy: {contact:?}: {sample:?}"
+            )),
         }
     }
 }
@@ -248,7 +250,7 @@ fn check_fade(last: &TickRecord, sample: &TickRecord) -> Result<(), String> {
     let (was, is) = (last.force_n, sample.force_n);
     if sample.mode == Mode::Fading && is.length() > was.length() * (1.0 + ROUNDING) {
         return Err(format!(
-            "a force of {} N grew while it went out: {sample:?}",
+            "a force of {} N increased while it ramped down: {sample:?}",
             was.length()
         ));
     }

@@ -151,7 +151,7 @@ impl<'t> Host<'t> {
         self.to_device.send(&out, now, disturbance, random);
     }
 
-    /// Repeats unanswered messages, and opens a new session if the device is gone.
+    /// Repeats unanswered messages, and opens a new session if the device was lost.
     fn run_timers(&mut self, now: u64, out: &mut Vec<u8>) {
         match self.client.append_due(time(now), out, &mut |_| {}) {
             Ok(()) => {}

@@ -36,7 +36,7 @@ pub struct Maxima {
     pub winding_c: f64,
     /// Energy that the ticks have created, as reported by the device, mJ.
     pub created_mj: f32,
-    /// The most energy that a contact has given to the tip with the controller on, mJ.
+    /// The max energy that a contact has added to the tip with the controller on, mJ.
     pub gained_mj: f32,
     /// Ticks in which `gained_mj` was computed.
     pub watched_ticks: u64,

@@ -1,4 +1,4 @@
-//! The report of a campaign: `log/campaign.md`.
+//! The report of a campaign: `campaign.md` of a month in `log/`.
 
 use super::LinkStats;
 use super::fault_kind::{Kind, STALL_TICKS};
@@ -38,9 +38,9 @@ effects has up to 16 materials, of up to 1.7 times that stiffness. The amplifier
 - No winding is above 112 °C, or more than 1 K warmer than the device estimates, after any reset.
 - No calibration is in force above the absolute limits of a Premium 1.5. None is stored without consent.
 - While force is on, it does not pull the HIP away from the proxy, except where both shading and texture turn it.
-  It is at most what the stiffest material, the highest texture and all of the damping make of the depth.
-- With the controller on and no fault yet, a contact on one stiffness gives the tip at most 0.05 mJ, 2 k A times its
-  depth, and with shading 2 E ([effects](../docs/explanation/effects.md)). Energy of a stiffening spring is not counted.
+  It is at most the force of the stiffest material, the highest texture and all of the damping at this depth.
+- With the controller on and no fault yet, a contact on one stiffness adds at most 0.05 mJ to the tip, 2 k A times its
+  depth, and with shading 2 E ([effects](../../docs/explanation/effects.md)). Energy of a stiffening spring is not counted.
 - With the controller on and no fault yet, the tip turns back by more than 0.3 mm at most {MAX_TURNS} times in 0.25 s.
   Tremor does so 6 times.
 - The device stores at most 2 mJ of energy to dissipate.
@@ -62,7 +62,7 @@ The energy was observed in {:.0} s of contact: {:.1} s of them in the ramp, {:.1
 | current of a motor | {:.4} A | 5.5 A |
 | change of the force in a tick | {:.4} N | 1 N |
 | temperature of a winding | {:.1} °C | 112 °C |
-| energy that a contact gave, controller on | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
+| energy added by a contact, controller on | {:.4} mJ | 0.05 mJ and 2 k A d, with shading 2 E |
 | turns of the tip in 0.25 s | {} | {MAX_TURNS} |
 | stored energy to dissipate | {:.3} mJ | 2 mJ |
 

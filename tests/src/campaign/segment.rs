@@ -296,7 +296,7 @@ impl<'t> Segment<'t> {
             return Err(format!("a replay lost the zero: {zero:?}"));
         }
         if *self.device.memory() != board::STORED {
-            return Err("a calibration was stored that nobody agreed to".into());
+            return Err("a calibration was stored without consent".into());
         }
         Ok(())
     }
@@ -333,7 +333,7 @@ impl<'t> Segment<'t> {
                 return Ok(status);
             }
         }
-        Err("the device does not tell its status".into())
+        Err("the device does not report its status".into())
     }
 
     /// Clears faults, zeroes and arms as a user would, until the force is ramped up.

@@ -112,7 +112,7 @@ impl TickChecks {
             let believed_c = f64::from(believed_c[axis]);
             if believed_c.is_nan() || believed_c < is_c - MAX_COLDER_K {
                 return Err(format!(
-                    "winding {} is at {is_c:.1} °C, and the device takes it to be at {believed_c:.1} °C",
+                    "winding {} is at {is_c:.1} °C, and the device estimates {believed_c:.1} °C",
                     axis + 1
                 ));
             }
@@ -135,7 +135,7 @@ impl TickChecks {
         }
         // No host requests held outputs while a terrain is served.
         if drive.held != Vec3::ZERO && !self.may_hold {
-            return Err(format!("{} held although nobody asked", drive.held));
+            return Err(format!("{} held without a request", drive.held));
         }
         if drive.held.is_nan() || drive.held.abs().cmpgt(Vec3::ONE).any() {
             return Err(format!("{} held is beyond full scale", drive.held));
@@ -244,7 +244,7 @@ impl TickChecks {
         self.extremes.created_mj = self.extremes.created_mj.max(mj);
         match (0.0..=MAX_CREATED_MJ).contains(&mj) {
             true => Ok(()),
-            false => Err(format!("{mj} mJ are to be taken back")),
+            false => Err(format!("{mj} mJ are to be dissipated")),
         }
     }
 

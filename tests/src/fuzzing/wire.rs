@@ -121,7 +121,7 @@ impl Wire {
             let _ = self.device.tick(GuardInputs::default());
             self.listen();
         }
-        panic!("the device does not take {} bytes", bytes.len());
+        panic!("the device does not accept {} bytes", bytes.len());
     }
 
     /// Checks that everything the device sends is a message.

@@ -7,7 +7,7 @@ use super::observed_tick::ObservedTick;
 use super::oracle::{TickOracle, Verdict};
 use super::surface::{Patch, distance, patches_at};
 
-/// Tolerance of the pull on a proxy that has slid, as a fraction of what friction holds.
+/// Tolerance of the pull on a proxy that has slid, as a fraction of the friction.
 const SLACK: f64 = 0.01;
 /// Longer moves in a tick, in cells, may leave the checked area.
 const SLIDES: f64 = 2.0;
@@ -40,7 +40,7 @@ impl TickOracle<'_> {
             return Ok(());
         };
         let slid = self.slip_start_of(observed);
-        // Dynamic friction holds a proxy that slid, static friction one that may have landed.
+        // Dynamic friction holds a proxy that slid, static friction one after a contact onset.
         let mu = f64::from(match slid {
             Some(_) => self.friction.dynamic_mu,
             None => self.friction.static_mu,
@@ -49,7 +49,7 @@ impl TickOracle<'_> {
         let place = observed.allowed() + min.rounding;
         let travelled = match (slid, self.before) {
             (Some(start), _) => distance(start, observed.proxy),
-            // A proxy that landed may have done so at any point nearer to the HIP than it was.
+            // The contact onset may be at any point nearer to the HIP than the proxy was.
             (None, Some(before)) => {
                 distance(before.proxy, observed.hip) + distance(observed.proxy, observed.hip)
             }

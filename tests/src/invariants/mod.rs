@@ -81,13 +81,13 @@ pub enum Invariant {
     /// On materials: a proxy that slides over a plane trails the HIP by the distance that the
     /// friction of its last position holds.
     Slides,
-    /// The same input gives identical bits.
+    /// The same input has identical results, bit by bit.
     Repeatable,
-    /// A scene shifted by whole cells gives identical bits.
+    /// A scene shifted by whole cells has identical results, bit by bit.
     Shift,
-    /// A small window that waits for tiles gives the same bits as a window of the whole field.
+    /// A small window that waits for tiles has identical results to one of the whole field.
     Window,
-    /// A mirrored or turned scene gives the same results, mirrored or turned.
+    /// A mirrored or turned scene has the same results, mirrored or turned.
     Symmetry,
 }
 

@@ -281,7 +281,7 @@ fn count(random: &mut Random) -> SampleCount {
     }
 }
 
-/// Returns a greeting with control sequences for a terminal.
+/// Returns a `DeviceHello` with control sequences for a terminal.
 #[must_use]
 pub fn hello(number: u8) -> DeviceHello {
     DeviceHello {

@@ -49,7 +49,7 @@ fn run_session(segment: &mut Segment<'_>, behaviour: Behaviour) -> Result<Outcom
         host.samples.clear();
         let seconds = 1 + ((now - began) / 1_000) as usize;
         if sent > seconds * MAX_BYTES_PER_SECOND {
-            return Err(format!("the host said {sent} bytes in {seconds} s"));
+            return Err(format!("the host sent {sent} bytes in {seconds} s"));
         }
         match &host.end {
             Some(End::Agreed) => return Err("the end was agreed on with no device".into()),

@@ -1,4 +1,4 @@
-//! The report of a campaign of link faults: `log/link-campaign.md`.
+//! The report of a campaign of link faults: `link-campaign.md` of a month in `log/`.
 
 use super::fault::Kind;
 use super::proxy_oracle::OFF_SURFACE;
@@ -28,9 +28,9 @@ contact, or while the host closes. In one segment of four the device's clock sto
 
 ## Checks in every tick
 
-- The checks of the [closed-loop campaign](campaign.md) on currents, force and its change in a tick hold.
+- The checks of the closed-loop campaign on currents, force and its change in a tick hold.
 - The proxy in contact lies on the bilinear surface of the terrain that the host serves, by an oracle in f64.
-- The amplifiers go on only if a live host has asked for it.
+- The amplifiers are switched on only if a live host has requested it.
 - On a working line, the user sees whether the amplifiers are on.
 
 ## Checks at the end of each step of a run

@@ -71,7 +71,7 @@ pub fn run(segment: &mut Segment<'_>, kind: Kind, stats: &mut LinkStats) -> Resu
 fn try_run(segment: &mut Segment<'_>, kind: Kind) -> Result<Option<Outcome>, String> {
     let steps = [Step::Open, Step::Arm, Step::Touch, Step::Close];
     let step = steps[segment.random.below(4)];
-    // A host that leaves is gone when the force has faded, within a tenth of a second.
+    // A session closes when the force has faded, within a tenth of a second.
     let within = if step == Step::Close { 90 } else { 400 };
     let plan = Plan {
         kind,
@@ -165,7 +165,7 @@ impl Run<'_, '_> {
         self.plan.done || self.plan.step != step
     }
 
-    /// Returns true if arming has ended: the user was told that the device does not arm, or sees it
+    /// Returns true if arming has ended: the user read that the device does not arm, or sees it
     /// disarmed, or the force is ramped up. Presses the switch when the user sees the request.
     fn is_armed(&mut self, pressed: &mut Option<u64>) -> bool {
         let now = self.segment.now;

@@ -16,7 +16,7 @@ use super::proxy_oracle;
 use crate::random::Random;
 
 /// Longest time that the user may see an outdated state on a working line, ms; also if another
-/// program has taken the device, which is reported to the user.
+/// program controls the device, which is reported to the user.
 const STALE: u64 = 1_500;
 /// Time after a stall of the line in which the device may still send old messages, ms.
 const DRAINS: u64 = 50;
@@ -238,7 +238,7 @@ impl<'t> Segment<'t> {
                 Ok(())
             }
             Some(other) => Err(format!(
-                "the host before vanished, and the next is told {other:?}"
+                "the host before vanished, and the next receives {other:?}"
             )),
         }
     }
@@ -267,7 +267,7 @@ impl<'t> Segment<'t> {
         let (was, is) = (self.was_on, self.board.drive.enabled);
         self.was_on = is;
         match is && !was && self.now >= self.wished {
-            true => Err("the amplifiers went on and no host had asked for it".into()),
+            true => Err("the amplifiers were switched on without a request of a host".into()),
             false => Ok(()),
         }
     }

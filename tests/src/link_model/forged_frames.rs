@@ -44,7 +44,7 @@ pub(super) fn takeover() -> [Vec<u8>; 2] {
     [hello, ToDevice::Bye].map(|message| frame(&InSession { session, message }))
 }
 
-/// Returns the same frame, except that a greeting becomes one of another version.
+/// Returns the same frame, except that a `Hello` message becomes one of another version.
 pub(super) fn of_another_version(bytes: Vec<u8>) -> Vec<u8> {
     let mut reader = Box::new(FrameReader::<MAX_FRAME>::new());
     let (_, Some(Ok(content))) = reader.push(&bytes) else {

@@ -1,5 +1,5 @@
-//! Record of both sides' frames before any fault: the device's greetings, the samples of each
-//! session, and whether a host has requested arming.
+//! Record of both sides' frames before any fault: the device's `Hello` messages, the samples of
+//! each session, and whether a host has requested arming.
 
 use std::collections::{HashMap, HashSet};
 
@@ -16,7 +16,7 @@ pub(super) struct FrameRecord {
     sessions: HashMap<u32, SampleCount>,
     /// The ticks of the samples that were sent in each session.
     ticks: HashMap<u32, HashSet<u32>>,
-    /// Each greeting of the device, and its session.
+    /// Each `Hello` message of the device, and its session.
     greetings: Vec<(u32, DeviceHello)>,
 }
 
@@ -69,7 +69,7 @@ impl FrameRecord {
         }
     }
 
-    /// Returns the greetings of a session up to now.
+    /// Returns the `Hello` messages of a session up to now.
     pub(super) fn greetings(&self, session: u32) -> impl Iterator<Item = &DeviceHello> {
         let of_it = self.greetings.iter().filter(move |(of, _)| *of == session);
         of_it.map(|(_, device)| device)

@@ -70,7 +70,7 @@ impl LossyLine {
         self.cut_until = self.cut_until.max(until);
     }
 
-    /// Drops an unfinished frame: its sender is gone.
+    /// Drops an unfinished frame: its sender has ended.
     pub(super) fn drop_partial(&mut self) {
         self.partial.clear();
     }

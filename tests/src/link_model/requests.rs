@@ -30,7 +30,7 @@ pub(super) enum RequestStep {
 pub(super) struct RequestSequence {
     remaining: VecDeque<RequestStep>,
     current: Option<(RequestStep, u64)>,
-    /// Counts of requests that succeeded, were refused, and were given up.
+    /// Counts of requests that succeeded, were refused, and were abandoned.
     pub(super) outcomes: [u32; 3],
 }
 

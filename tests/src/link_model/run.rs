@@ -54,11 +54,11 @@ pub struct Report {
     pub driven: bool,
     /// Sessions whose end the host reports as unknown.
     pub uncertain: u64,
-    /// Times that the host gave up a session and opened another.
+    /// Number of sessions that the host abandoned to open another.
     pub resumptions: u32,
     /// Status queries that were answered.
     pub answers: u32,
-    /// Other requests than arming and disarming: succeeded, refused, and given up.
+    /// Other requests than arming and disarming: succeeded, refused, and abandoned.
     pub outcomes: [u32; 3],
 }
 
@@ -416,7 +416,7 @@ impl<'t> Simulation<'t> {
             Step::Requesting if self.has_requests(1) => self.run_requests(1),
             Step::Requesting => self.close(),
             Step::Closing if is_closed => self.step = Step::Ended(End::Agreed),
-            // A user who waits too long gives up and closes the session.
+            // After its time-out, a user closes the session.
             _ if self.now.is_multiple_of(40_000) && self.step != Step::Closing => self.close(),
             _ => {}
         }

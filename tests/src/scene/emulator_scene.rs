@@ -46,7 +46,7 @@ impl EmulatorScene {
     /// Runs a scene of a seed in real time, as the board does, and records it.
     ///
     /// # Panics
-    /// If a tick in real time gives no result.
+    /// If a tick in real time has no result.
     #[must_use]
     pub fn random(seed: u64, number: u64, surface: Surface) -> Self {
         let scene = Scene {

@@ -49,7 +49,7 @@ pub struct Materials {
     pub params: SurfaceParams,
     /// Millimetres a cell: a power of two, so that lengths in cells are exact.
     pub cell_mm: f32,
-    /// Samples each way.
+    /// Samples along each side.
     size: [i32; 2],
     /// The class of each sample, by rows from the south.
     classes: Vec<u8>,

@@ -201,7 +201,7 @@ fn transformed(scene: &Scene, symmetry: Symmetry) -> Scene {
     scene.with(symmetry.terrain(&scene.terrain), path)
 }
 
-/// Compares the forces with those of the mirrored or turned twin.
+/// Compares the forces with those of the mirrored or turned scene.
 ///
 /// # Errors
 /// A difference that rounding does not explain.
@@ -290,7 +290,7 @@ const SLACK: f64 = 0.03;
 fn agree(scene: &Scene, proxy: [f64; 3], a: &ObservedTick, b: &ObservedTick) -> bool {
     let (da, db) = (distance(a.proxy, a.hip), distance(b.proxy, b.hip));
     let tie = (da - db).abs() <= 1e-5 * da.max(1.0);
-    // A HIP in the surface may be touching or free: neither gives a force.
+    // A HIP in the surface may be touching or free: both without force.
     let at_hip = |observed: &ObservedTick| {
         let may = matches!(
             observed.output.state,

@@ -12,7 +12,7 @@ const MAX_HEIGHT: f32 = (1 << 29) as f32;
 pub enum Kind {
     /// One height everywhere.
     Flat,
-    /// A plane that slopes both ways.
+    /// A plane that slopes in both directions.
     Slope,
     /// Waves a few cells long.
     Hills,

@@ -69,8 +69,8 @@ fn ratio(terrain: &Terrain<'_>, sample: &TickRecord) -> Option<f64> {
 }
 
 /// Returns true if, from a point on a proxy's path, the straight line to a HIP leads through air or
-/// over no-data: there the proxy leaves the surface, lands elsewhere, and may be held where it
-/// lands.
+/// over no-data: there the proxy leaves the surface, makes contact elsewhere, and may be
+/// held there.
 fn leaves_surface(terrain: &Terrain<'_>, path: [[f64; 3]; 2], hip: [f64; 3]) -> bool {
     let [from, to] = path;
     let between = |from: [f64; 3], to: [f64; 3]| {
@@ -93,8 +93,8 @@ fn leaves_surface(terrain: &Terrain<'_>, path: [[f64; 3]; 2], hip: [f64; 3]) -> 
 /// more than `off` of μ is left out if the proxy flew.
 fn ratios(terrain: &Terrain<'_>, mu: f64, depth: f64, speed: f64, off: f64) -> Vec<f64> {
     let rendered = slide(terrain, params(Friction::coulomb(mu as f32)), depth, speed);
-    // A proxy that has just landed has not slid yet, and one that a wall has held, far behind the
-    // HIP, moves over many cells at once.
+    // A proxy after a contact onset has not slid yet, and one that a wall has stopped, far behind
+    // the HIP, moves over many cells at once.
     let trails = 2.0 * depth * (1.0 + mu * mu).sqrt() + 3.0 * speed;
     let slides = rendered.windows(2).filter(|pair| {
         let touches = |sample: &TickRecord| sample.state == ContactState::Touching;

@@ -174,7 +174,7 @@ fn both_oracles_agree_on_random_scenes() {
         assert_eq!(found.late, [0; 0], "scene {number} of seed 77, {kind:?}");
         if !found.wrong.is_empty() {
             println!(
-                "scene {number}, {kind:?}: both say wrong at {:?}",
+                "scene {number}, {kind:?}: both report an error at {:?}",
                 found.wrong
             );
         }

@@ -1,5 +1,5 @@
-//! Each test gives the oracle of materials one false observation, which it must report; it reports
-//! none of the correct ones around it, from the product's loop.
+//! Each test passes one false observation to the oracle of materials, which it must report; it
+//! reports none of the correct ones around it, from the product's loop.
 
 use hapterra_core::Vec3;
 use hapterra_core::contact::{ContactState, Friction};

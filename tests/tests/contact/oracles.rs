@@ -1,4 +1,4 @@
-//! For each invariant a test gives the oracle one false observation and checks that only this
+//! For each invariant a test passes one false observation to the oracle and checks that only this
 //! invariant reports it. The correct observation beside it is reported by none.
 
 use hapterra_core::Vec3;
@@ -197,7 +197,7 @@ fn proxy_trailing_beyond_its_viscous_slide_is_detected() {
         let oracle = TickOracle::new(&flat).with_friction(friction);
         broken_of(oracle, ticks)
     };
-    // From (12, 10.5), where it landed or rested, by 2 cells: that holds 6.
+    // From (12, 10.5), its contact onset or rest, by 2 cells; friction holds 6.
     let slid = touching([20.03, 10.5, 1.0], [14.0, 10.5, 2.0]);
     let from = |x: f64| touching([x, 10.5, 1.9], [x, 10.5, 2.0]);
     assert_eq!(found(&[from(12.0), slid]), []);

@@ -209,7 +209,7 @@ fn walls(x: i32, _: i32) -> f32 {
 }
 
 #[test]
-fn figure_8_a_fast_sweep_does_not_pass_through_what_is_thin() {
+fn figure_8_fast_sweep_does_not_cross_thin_walls() {
     let mut contact = FieldContact::new(64, walls);
     contact.step([10.0, 30.3, 3.0]);
     let rendered = contact.step([50.0, 30.7, 3.0]);

@@ -56,7 +56,7 @@ fn rendered() -> Option<(Vec<TickRecord>, Status)> {
                     Event::Status(reported) => status = Some(reported.clone()),
                     _ => {}
                 })
-                .expect("goes on");
+                .expect("it continues");
             if !queried && samples.last().is_some_and(|last| last.tick >= ticks) {
                 session.enqueue(HostRequest::Status);
                 queried = true;

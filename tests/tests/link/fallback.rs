@@ -312,7 +312,7 @@ fn fallback_prevents_missing_terrain_at_2000_cells_per_second() {
     let ground = measure_ground(&terrain, &in_memory(&slide, without).0);
     assert!(
         ground.lacked > 100,
-        "without a fallback there are holes: {ground:?}"
+        "without a fallback there is no-data: {ground:?}"
     );
     let scene = slide.scene(true);
     check_slide(

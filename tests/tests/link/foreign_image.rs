@@ -91,6 +91,7 @@ fn writes_a_file(path: &Path) -> Vec<u8> {
     image(&code(block), &reported(b'R'), &reported(b'F'), &data)
 }
 
+/// Safety: images.
 #[test]
 fn emulated_image_cannot_access_host_files() {
     let Some(qemu) = qemu() else { return };
@@ -100,7 +101,7 @@ fn emulated_image_cannot_access_host_files() {
     let (emulator, mut lines) = Emulator::start(&qemu, &path).expect("started");
     let mut reported = [0];
     let n = lines.link.receive(&mut reported, HANG).expect("stands");
-    assert_eq!(n, 1, "nothing came");
+    assert_eq!(n, 1, "no reply");
     assert!(!target.exists(), "the image made a file");
     assert_eq!(reported, *b"F", "the call was let through");
     drop(emulator);

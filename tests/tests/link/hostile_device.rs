@@ -139,6 +139,7 @@ fn terrain(folder: &Path) -> std::path::PathBuf {
     path
 }
 
+/// Safety: images.
 #[test]
 fn device_text_cannot_control_the_terminal() {
     let device = started();
@@ -153,6 +154,7 @@ fn device_text_cannot_control_the_terminal() {
     is_plain(&hapterra(&["list", "--tcp", &device]));
 }
 
+/// Safety: images.
 #[test]
 fn device_requests_cannot_flood_the_terminal() {
     let folder = tempfile::tempdir().expect("a folder");

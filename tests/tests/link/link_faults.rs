@@ -1,5 +1,5 @@
-//! Links that lose, damage and repeat bytes, hosts that die, different versions: the host's client
-//! with the device's own application, in memory.
+//! Links that lose, damage and repeat bytes, hosts that end abruptly, different versions: the
+//! host's client with the device's own application, in memory.
 
 use std::cell::{Cell, RefCell};
 use std::io;
@@ -67,7 +67,7 @@ fn force_is_the_same_over_a_bad_link() {
     };
     let mut clean = on_native(&terrain, params).expect("opened");
     let expected = walk(&mut clean);
-    // The last one duplicates everything, including the greeting.
+    // The last one duplicates everything, including the `Hello` message.
     for (fault, one_in) in [
         (Fault::Flip, 20),
         (Fault::Drop, 20),
@@ -82,7 +82,7 @@ fn force_is_the_same_over_a_bad_link() {
         assert!(expected == got, "{fault:?} changed the force");
         let stats = replayer.stats();
         eprintln!("{fault:?}: {} transfers harmed, {stats:?}", harmed.borrow());
-        assert!(*harmed.borrow() > 50, "no harm, no test");
+        assert!(*harmed.borrow() > 50, "no fault was injected");
         if fault != Fault::Twice {
             assert!(stats.bad_frames > 0);
         }
@@ -125,6 +125,7 @@ impl Transport for Tap {
     }
 }
 
+/// Safety: images.
 #[test]
 fn telemetry_that_is_lost_is_counted() {
     let raster = fractal();
@@ -147,17 +148,17 @@ fn telemetry_that_is_lost_is_counted() {
         session
             .poll(Duration::ZERO, &mut |event| {
                 if let Event::Sample(sample) = event {
-                    assert!(sample.tick > last, "a sample came twice or too late");
+                    assert!(sample.tick > last, "a sample arrived twice or too late");
                     last = sample.tick;
                 }
             })
-            .expect("goes on");
+            .expect("it continues");
     }
     session.close(&mut |_| {}).expect("confirmed");
     let stats = session.stats();
     // Losses before the first and after the last sample received are counted as well.
     eprintln!("{last} ticks, {stats:?}");
-    assert!(stats.lost + stats.dropped > 100, "no harm, no test");
+    assert!(stats.lost + stats.dropped > 100, "no fault was injected");
     assert_eq!((stats.sessions, stats.uncertain), (1, 0));
     assert_eq!((stats.samples + stats.lost, stats.dropped), made.get());
 }
@@ -179,7 +180,7 @@ fn returning_host_resumes_the_session_of_its_device() {
                         last = *sample;
                     }
                 })
-                .expect("goes on");
+                .expect("it continues");
         }
         last
     };
@@ -193,7 +194,7 @@ fn returning_host_resumes_the_session_of_its_device() {
     assert_eq!(before.state, ContactState::Touching);
     let fetched = session.stats().tiles;
     drop(session);
-    // It dies in the middle of a frame, and is away for half a second.
+    // It ends in the middle of a frame, and is absent for half a second.
     device.borrow_mut().send(&[7; 30]).expect("sent");
     device.borrow_mut().run_ticks(500);
     let (mut session, hello) =

@@ -1,6 +1,6 @@
 //! Every frame of a session lost, repeated, delayed and overtaken, either end killed at every
-//! moment: the end is confirmed or reported, no force acts that no host wanted, every sample is
-//! counted once.
+//! moment: the end is confirmed or reported, no force acts without a request of a host, every
+//! sample is counted once.
 
 use hapterra_tests::link_model::{
     Direction, End, FrameFault, Interruption, Plan, Report, check, frames,
@@ -42,6 +42,7 @@ fn undisturbed_session_ends_at_once_without_uncertainty() {
     assert!(report.ticks < 2_000 && report.uncertain == 0, "{report:?}");
 }
 
+/// Safety: 26.
 #[test]
 fn session_survives_any_single_lost_repeated_or_late_frame() {
     let frame_faults = single_harms();
@@ -139,6 +140,7 @@ fn interrupted(what: Interruption) {
     }
 }
 
+/// Safety: 26.
 #[test]
 fn host_may_be_killed_at_any_moment() {
     interrupted(Interruption::HostKilled);
@@ -215,6 +217,7 @@ fn at_every_moment_after(histories: &[Vec<(u64, Interruption)>], what: Interrupt
     }
 }
 
+/// Safety: 32.
 #[test]
 fn replay_of_earlier_frames_does_not_change_the_outcome() {
     for direction in [Direction::ToDevice, Direction::ToHost] {
@@ -234,6 +237,7 @@ fn host_of_another_version_may_connect_at_any_moment() {
     at_every_moment_after(&histories(), Interruption::OtherHost);
 }
 
+/// Safety: 32.
 #[test]
 fn replaced_host_reports_takeover_promptly() {
     let ticks = agree(&Plan::default()).ticks;
@@ -262,6 +266,7 @@ fn replaced_host_reports_takeover_promptly() {
     assert!(reported > 40, "{reported}");
 }
 
+/// Safety: 32.
 #[test]
 fn late_answer_is_never_matched_to_a_later_query() {
     let mut answers = 0;
@@ -388,6 +393,7 @@ fn cut_in_one_direction_ends_in_confirmed_disarm_or_report() {
     }
 }
 
+/// Safety: 26.
 #[test]
 fn random_faults_end_in_confirmed_disarm_or_a_report() {
     let (mut agreed, mut reported) = (0, 0);
@@ -399,7 +405,7 @@ fn random_faults_end_in_confirmed_disarm_or_a_report() {
             Err(wrong) => panic!("{wrong:?} in {plan:?}"),
         }
     }
-    eprintln!("{agreed} agreed, {reported} told");
+    eprintln!("{agreed} agreed, {reported} reported");
     assert!(agreed > 200, "hardly ever agreed: {agreed}");
 }
 

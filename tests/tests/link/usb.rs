@@ -84,7 +84,7 @@ fn board_is_enumerated_and_found_by_the_client() {
 fn microsoft_os_descriptors_request_winusb() {
     let (mut board, found) = enumerated();
     let version = u16::from_le_bytes([found.device[2], found.device[3]]);
-    assert!(version >= 0x0201, "a BOS is asked for from 2.01 on");
+    assert!(version >= 0x0201, "a BOS is requested from 2.01 on");
     let head = descriptor(&mut board, 15, 0, 5).expect("BOS");
     let total = u16::from_le_bytes([head[2], head[3]]);
     let bos = descriptor(&mut board, 15, 0, total).expect("BOS");
@@ -116,8 +116,9 @@ fn invalid_control_request_stalls_and_next_one_is_answered() {
     }
 }
 
+/// Safety: 33.
 #[test]
-fn halting_an_endpoint_that_is_not_there_harms_nothing() {
+fn halting_a_missing_endpoint_has_no_effect() {
     let (mut board, _) = enumerated();
     for endpoint in [0x05, 0x85, 0x0F, 0x8F] {
         // Set, read, clear: the stack survives any answer.
@@ -194,7 +195,7 @@ fn device_packets_never_need_a_zero_length_packet() {
         if let Answer::Data(packet) = board.take_in(LINK) {
             assert!((1..PACKET).contains(&packet.len()), "{}", packet.len());
         }
-        board.wait().expect("goes on");
+        board.wait().expect("it continues");
     }
 }
 
@@ -264,7 +265,7 @@ fn ticks(session: &mut Session<'_>, polls: usize) -> Vec<u32> {
         };
         session
             .poll(Duration::from_millis(1), &mut take)
-            .expect("goes on");
+            .expect("it continues");
     }
     ticks
 }
@@ -321,7 +322,7 @@ fn unplugged_board_keeps_ticking_and_resumes_its_session() {
         let mut unplugged = board.borrow_mut();
         for ms in 0..2000 {
             for _ in 0..hapterra_tests::usb::MOMENTS_A_MS {
-                unplugged.wait().expect("goes on");
+                unplugged.wait().expect("it continues");
             }
             let alive = unplugged.is_alive();
             assert!(

@@ -111,8 +111,8 @@ fn force_above_the_maximum_for_its_depth_is_reported() {
     assert!(force(1.61).is_err());
 }
 
-/// Enters and leaves the ground at 50 mm/s, with `more` additional force on the way out. Returns
-/// true if it is reported, and the energy that the contact gave.
+/// Enters and leaves the ground at 50 mm/s, with `more` additional force during the exit. Returns
+/// true if it is reported, and the energy that the contact added.
 fn tap(params: &SurfaceParams, more: f32, is_calm: bool) -> (bool, f32) {
     taps(params, more, is_calm, 1)
 }
@@ -138,7 +138,7 @@ fn taps(params: &SurfaceParams, more: f32, is_calm: bool, times: usize) -> (bool
 
 #[test]
 fn energy_created_by_taps_is_reported_with_controller_on() {
-    // A spring that is sampled in ticks gives K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
+    // A spring that is sampled in ticks adds K (T / 2 + L) v a metre: 0.5 N/mm, 0.61 ms, 50 mm/s
     // and twice 0.75 mm.
     let (reported, energy_mj) = tap(&PARAMS, 0.0, true);
     assert!(
@@ -154,7 +154,7 @@ fn energy_created_by_taps_is_reported_with_controller_on() {
         shading: Shading::Smooth,
         ..PARAMS
     };
-    // Shading may give 0.2 mJ more, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
+    // Shading may add 0.2 mJ, and 0.2 times 0.375 N times 0.5 mm and 0.75 mm.
     let (reported, energy_mj) = tap(&shaded, 0.99, true);
     assert!(!reported && energy_mj > 0.1, "{energy_mj}");
     let (reported, energy_mj) = taps(&shaded, 0.99, true, 3);
@@ -190,7 +190,7 @@ fn ramped_force_is_checked_against_the_ramp_share() {
     assert!(ramped(-0.01).is_err());
 }
 
-/// Taps during the ramp, with more force on the way out, as in an old version of the tick.
+/// Taps during the ramp, with more force during the exit, as in an old version of the tick.
 #[test]
 fn energy_created_by_taps_in_the_ramp_is_reported() {
     let tapped = |more: f32| {

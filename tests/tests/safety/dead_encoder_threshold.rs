@@ -76,6 +76,8 @@ fn assert_passes(what: &str, max: [u32; 3]) {
 }
 
 /// The hardest case: only the tremor moves the other joints.
+///
+/// Safety: 8.
 #[test]
 fn tremor_prevents_dead_encoder_fault_on_one_joint_motion() {
     let ways = [(0.1, 0.3), (0.3, 0.3), (0.8, 0.3), (0.5, 0.03)];

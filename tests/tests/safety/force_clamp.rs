@@ -40,6 +40,7 @@ fn converted(current_a: f32) -> f64 {
     (code - MIDDLE) / SPAN * f64::from(FULL_SCALE_A)
 }
 
+/// Safety: 10.
 #[test]
 fn encoder_error_of_two_jumps_keeps_force_within_the_maximum() {
     let record = Calibration::PREMIUM_1_5;

@@ -1,4 +1,4 @@
-//! What protects the hand: the guard in the closed loop, injected faults, limits.
+//! Protection of the hand: the guard in the closed loop, injected faults, limits.
 
 mod campaign;
 mod campaign_force_invariants;

@@ -2,7 +2,6 @@
 //! and numbers. Each is named, and no joint moves faster than stated.
 
 use std::cell::RefCell;
-use std::path::Path;
 
 use hapterra::bringup::{
     Attendant, BenchMistakes, BringupError, Finding, Identity, Log, Question, Reading, SequenceEnd,
@@ -14,6 +13,7 @@ use hapterra_core::guard::{Blockers, Jog, MAX_JOG_SPEED_RAD_S};
 use hapterra_core::phantom::Calibration;
 use hapterra_core::wire::request::{Refusal, Request};
 use hapterra_firmware::native::StoppedClock;
+use hapterra_tests::newest_log;
 use hapterra_tests::timeouts::HANG;
 
 const RECORD: Calibration = Calibration::PREMIUM_1_5;
@@ -72,10 +72,9 @@ fn run_once(
     run_sequence(&mut opened.expect("it answers"), user, log, &mut |_| Ok(()))
 }
 
-/// Returns the transcript for a user without mistakes, as in the documentation.
+/// Returns the transcript for a user without mistakes.
 fn transcript() -> String {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bring-up-transcript.txt");
-    std::fs::read_to_string(file).expect("a transcript")
+    std::fs::read_to_string(newest_log("bring-up-transcript.txt")).expect("a transcript")
 }
 
 /// Returns the step and the finding at which a walk with this bench and record ends.
@@ -144,7 +143,7 @@ fn bringup_resumes_and_repeats_steps_of_a_changed_record() {
     record.motor_sign.y = -1.0;
     run_bringup(&mut user, record, &mut log).expect("to the end");
     let text = PRINTED.take();
-    assert!(text.starts_with("the calibration is another one"), "{text}");
+    assert!(text.starts_with("the calibration has changed"), "{text}");
     assert!(text.contains("step 6 of 11") && !text.contains("step 5 of 11"));
 }
 
@@ -220,6 +219,7 @@ fn found_of_the_board(mistakes: BenchMistakes) -> (Step, Finding) {
     found(wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
 
+/// Safety: images, bring-up.
 #[test]
 fn wrong_tick_rate_of_the_board_is_named() {
     for clock_slow_by in [0.05, -0.05, 0.5, -1.0] {
@@ -244,6 +244,7 @@ fn wrong_tick_rate_of_the_board_is_named() {
     assert_eq!(step, Step::Outputs);
 }
 
+/// Safety: images, bring-up.
 #[test]
 fn unlocked_usb_clock_is_named() {
     let unlocked = BenchMistakes {
@@ -254,6 +255,7 @@ fn unlocked_usb_clock_is_named() {
     assert_eq!(found, (Step::Board, Finding::UsbClockUnlocked));
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     // On an arm without weight, the other joints keep their positions.
@@ -285,6 +287,7 @@ fn unheld_arm_is_stopped_at_the_jog_speed_limit() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrongly_scaled_amplifier_is_named() {
     for (gain, axis, step) in [(0.4, 0, Step::Motor1), (2.0, 1, Step::Motor2)] {
@@ -304,6 +307,7 @@ fn wrongly_scaled_amplifier_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrong_gravity_record_is_named() {
     // It is detected before the arm is as fast as in a jog: `run_bringup` checks that.
@@ -319,6 +323,7 @@ fn wrong_gravity_record_is_named() {
     }
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn swapped_motors_are_named() {
     let (step, finding) = found_from(Step::Motor1, wired(Wiring::RIGHT.swapped(1, 2)), RECORD);
@@ -326,6 +331,7 @@ fn swapped_motors_are_named() {
     assert_eq!(finding, Finding::SwappedMotors { motor: 2, joint: 3 });
 }
 
+/// Safety: 16, bring-up.
 #[test]
 fn inverted_motor_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]
@@ -342,6 +348,7 @@ fn inverted_motor_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn dead_encoder_is_named() {
     for axis in 0..3 {
@@ -352,6 +359,7 @@ fn dead_encoder_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn wrong_ratio_is_named() {
     let mut model = PhantomModel::premium_1_5();
@@ -374,6 +382,7 @@ fn found_at(from: Step, mistakes: BenchMistakes) -> (Step, Finding) {
     found_from(from, wired(Wiring::RIGHT).with_mistakes(mistakes), RECORD)
 }
 
+/// Safety: bring-up.
 #[test]
 fn miswired_emergency_stop_is_named() {
     let normally_open = BenchMistakes {
@@ -394,6 +403,7 @@ fn miswired_emergency_stop_is_named() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn enable_line_without_pull_down_is_named() {
     let floats = BenchMistakes {
@@ -407,6 +417,7 @@ fn enable_line_without_pull_down_is_named() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn grounded_ready_input_is_named() {
     for axis in 0..3 {
@@ -419,6 +430,7 @@ fn grounded_ready_input_is_named() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn output_offset_is_named_at_the_amplifier_input() {
     for axis in 0..3 {
@@ -442,6 +454,7 @@ fn output_offset_is_named_at_the_amplifier_input() {
     }
 }
 
+/// Safety: bring-up.
 #[test]
 fn missing_amplifier_is_named_before_any_motor() {
     for axis in 0..3 {
@@ -479,6 +492,7 @@ fn amplifiers_without_ready_lines_are_noted() {
     );
 }
 
+/// Safety: bring-up.
 #[test]
 fn motor_without_push_is_named() {
     for (axis, step) in [Step::Motor1, Step::Motor2, Step::Motor3]

@@ -40,7 +40,7 @@ fn run(terrain: &Terrain<'_>, scene: Scene, rig: HeldPhantom, ticks: u32) -> Vec
         };
         session
             .poll(Duration::ZERO, &mut on_event)
-            .expect("goes on");
+            .expect("it continues");
     }
     assert_eq!(session.stats().lost + session.stats().dropped, 0);
     assert!(samples.iter().all(|sample| sample.fault.is_none()));
@@ -84,7 +84,7 @@ fn tip_rests_at_the_depth_of_two_newtons() {
     for stiffness in [0.5f32, 0.25, 1.0] {
         let (samples, lift, scale) = press(stiffness);
         let expected_mm = 2.0 / f64::from(stiffness);
-        // Friction holds 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
+        // Friction carries 0.01 N·m on an arm of 0.21 m against the springs of wall and hand
         // together; two encoders are half a count off.
         let hand_n_per_mm = 1e-3 / HandModel::default().compliance_m_per_n();
         let bound_mm = 0.01 / 0.2095 / (f64::from(stiffness) + hand_n_per_mm) + 0.03;

@@ -74,7 +74,7 @@ fn run_prints_the_rendering_of_an_emulated_board() {
 }
 
 #[test]
-fn status_of_the_device_in_memory_names_what_blocks_it() {
+fn status_of_the_native_device_lists_its_blockers() {
     let output = hapterra(&["status", "--device", "native"]);
     let text = output_text(&output);
     assert!(output.status.success(), "{text}");
@@ -114,6 +114,8 @@ fn calibration_record_round_trips_through_a_file() {
 }
 
 /// A Premium 1.0's ratios have no source: a record without measured ratios needs explicit consent.
+///
+/// Safety: images.
 #[test]
 fn guessed_ratios_need_measurement_or_explicit_consent() {
     let base = ["calibrate", "--device", "native", "--no-store", "--yes"];
@@ -150,9 +152,9 @@ fn record_above_absolute_limit_is_refused_before_sending() {
         "--set",
     ];
     for (setting, part) in [
-        ("peak-a-1=20", "5.5 A"),
-        ("max-force-n=20", "8.5 N"),
-        ("torque-constant-2=0.005", "check the ratio"),
+        ("peak-current-1=20A", "5.5 A"),
+        ("max-force=20N", "8.5 N"),
+        ("torque-constant-2=5mNm/A", "check the ratio"),
     ] {
         fails(&[&base[..], &[setting]].concat(), 1, &[part, "hint:"]);
     }
@@ -193,9 +195,10 @@ fn wrong_arguments_have_an_error_with_a_remedy() {
             set,
         ]
     };
-    fails(&calibrate("l1-mm=3"), 1, &["30 to 1000 mm", "hint:"]);
-    fails(&calibrate("length=3"), 2, &["l1-mm"]);
-    fails(&calibrate("l1-mm=long"), 2, &["no number"]);
+    fails(&calibrate("l1=3mm"), 1, &["30 to 1000 mm", "hint:"]);
+    fails(&calibrate("length=3"), 2, &["l1, l2"]);
+    fails(&calibrate("l1=long"), 2, &["a number in mm"]);
+    fails(&calibrate("l1-mm=3"), 2, &["l1=215mm"]);
     fails(
         &["calibrate", "--device", "native", "--from", "/no/such"],
         1,

@@ -370,13 +370,15 @@ fn demo_emits_samples_marks_and_refusals() {
         .iter()
         .map(|it| it["text"].to_string())
         .collect();
-    for why in ["asked nothing", "no such word"] {
+    for why in ["no open question", "no such word"] {
         assert!(refused.iter().any(|text| text.contains(why)), "{refused:?}");
     }
     assert_eq!(kind("end")[0]["disarmed"], true);
 }
 
-/// The program that sends commands is gone, and has left more than a device can still execute.
+/// The program that sends commands has ended, with more commands than the device can still execute.
+///
+/// Safety: 28.
 #[test]
 fn run_ends_disarmed_when_its_input_ends() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -422,6 +424,8 @@ fn run_ends_disarmed_when_its_input_ends() {
 }
 
 /// A real arm is zeroed only by the answer to the right question.
+///
+/// Safety: 28.
 #[test]
 fn enter_answers_the_question_of_its_number() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -74,6 +74,7 @@ fn assert_names_partial_file(run: &Output, partial_file: &Path, content: &[u8]) 
     assert_eq!(fs::read(partial_file).expect("still there"), content);
 }
 
+/// Safety: images.
 #[test]
 fn recording_of_a_killed_run_is_kept_and_named_at_next_start() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -217,7 +217,7 @@ fn replay_uses_the_materials_of_the_recording() {
     folder.classes("classes.asc", 8.9902);
     let (again, printed) = replay(&[], "e.csv");
     assert!(
-        !again && printed.contains("classes of its materials are others"),
+        !again && printed.contains("classes of its materials differ"),
         "{printed}"
     );
 }

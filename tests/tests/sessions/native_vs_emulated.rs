@@ -101,7 +101,7 @@ fn replay_is_bit_identical_on_the_emulated_board() {
             .filter(|rendered| rendered.5 == ContactState::Touching)
             .count();
         assert!(touched > 50, "{name}: the walk hardly touches");
-        board.close().expect("said");
+        board.close().expect("reported");
         emulator.finish().expect("the board ended well");
     }
 }
@@ -172,7 +172,7 @@ fn interrupted_emulated_demo_ends_in_order() {
         .expect("started");
     let mut lines = std::io::BufReader::new(demo.stdout.take().expect("piped")).lines();
     let device = lines.find(|line| line.as_ref().is_ok_and(|line| line.starts_with("device")));
-    assert!(device.is_some(), "it never says which device");
+    assert!(device.is_some(), "no device is named");
     pass(Duration::from_secs(1));
     let group = format!("-{}", demo.id());
     let signal = Command::new("kill").args(["-INT", "--", &group]).status();

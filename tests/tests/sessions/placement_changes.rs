@@ -175,14 +175,14 @@ impl Touching<'_> {
         };
         self.session
             .poll(Duration::ZERO, &mut on_event)
-            .expect("goes on");
+            .expect("it continues");
         for request in self.steering.requests() {
             self.session.enqueue(request);
         }
         if let Some(update) = self.steering.take_update() {
             self.session
                 .put_view(update.view, update.terrain)
-                .expect("said");
+                .expect("reported");
         }
         self.messages.extend(self.steering.lines());
     }
@@ -281,6 +281,7 @@ fn remaining_press_share() -> f32 {
     (1.0 / STIFFNESS) / (compliance_mm_per_n + 1.0 / STIFFNESS)
 }
 
+/// Safety: 15.
 #[test]
 fn force_makes_no_step_while_zooming_through_eight_levels() {
     let raster = hills();
@@ -306,6 +307,7 @@ fn force_makes_no_step_while_zooming_through_eight_levels() {
     });
 }
 
+/// Safety: 15.
 #[test]
 fn force_makes_no_step_while_panning_and_scaling() {
     let raster = hills();
@@ -453,6 +455,7 @@ fn tip_command_during_contact_causes_no_force_step() {
     });
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_carries_the_terrain_with_the_hand() {
     let raster = hills();

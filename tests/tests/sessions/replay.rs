@@ -105,7 +105,7 @@ fn check_contact(raster: &Raster, scale: Scale, seed: u64, rows: usize) -> usize
             near_holes += 1;
         }
     }
-    eprintln!("{touched} of {rows} rows in contact, {near_holes} of them near a hole or border");
+    eprintln!("{touched} of {rows} rows in contact, {near_holes} of them near no-data or a border");
     touched
 }
 

@@ -218,7 +218,7 @@ fn missing_device_error_names_address_and_hint() {
     );
     let Some(usb) = std::env::var_os("HAPTERRA_NO_BOARD").map(|_| run("usb")) else {
         eprintln!(
-            "skipped: a board may be plugged in here; HAPTERRA_NO_BOARD=1 says there is none"
+            "skipped: a board may be plugged in here; HAPTERRA_NO_BOARD=1 states that there is none"
         );
         return;
     };

@@ -234,7 +234,7 @@ fn times_that_contradict_a_recordings_rate_are_refused() {
     let recording = folder.recording(1_000, &sampled(4_000, 0.6, drag), &VISCOUS);
     let printed = folder.fails(&recording, &[]);
     let expected =
-        "0.00025 s is 0.25 ticks after the row before, where the settings say 1000 ticks";
+        "0.00025 s is 0.25 ticks after the row before, but the settings state 1000 ticks";
     assert!(
         printed.contains(expected) && printed.contains("--rows-are-ticks"),
         "{printed}"
@@ -301,7 +301,7 @@ fn wrong_times_are_refused_and_odd_ones_reported() {
     for (rows, expected) in [
         (
             "0,40,20,1\n0.002,40,20,0\n0.001,40,20,1\n",
-            "line 4, column t_s: time goes back from 0.002 s to 0.001 s",
+            "line 4, column t_s: time decreases from 0.002 s to 0.001 s",
         ),
         (
             "0,40,20,1\n0.001,40,20,0\n0.001,40,20,1\n",

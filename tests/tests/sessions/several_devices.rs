@@ -187,6 +187,7 @@ fn signal_closes_each_session_with_confirmation() {
     }
 }
 
+/// Safety: 34.
 #[test]
 fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     let pair = Pair::of(SocketDevice::start());
@@ -216,6 +217,7 @@ fn unconfirmed_board_is_named_beside_a_confirmed_one() {
     assert_eq!(pair.served[1].last_end(), SessionEnd::Replaced);
 }
 
+/// Safety: 34.
 #[test]
 fn second_signal_names_the_unconfirmed_boards() {
     let pair = Pair::of(SocketDevice::start());
@@ -237,6 +239,7 @@ fn second_signal_names_the_unconfirmed_boards() {
     assert!(!line.contains(&pair.name(1)), "{printed}");
 }
 
+/// Safety: 34.
 #[test]
 fn lost_device_is_waited_for_and_the_other_continues() {
     let gone = Arc::new(AtomicBool::new(false));

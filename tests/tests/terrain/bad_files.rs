@@ -1,4 +1,4 @@
-//! Any file that is opened gives an error or a terrain: never a panic, never a hang, never more
+//! Any file results in an error or a terrain: never a panic, never a hang, never more
 //! memory than the file justifies.
 
 use std::path::{Path, PathBuf};
@@ -98,8 +98,8 @@ fn non_terrain_file_is_refused_with_its_specific_fault() {
         ("empty.tif", b"", "empty"),
         ("notes.txt", b"ncols of cabbage", "unknown file format"),
         ("song.mp3", b"ID3\x03 no terrain", "unknown file format"),
-        ("named.tif", b"hello, world", "its name says TIFF"),
-        ("samples.raw", &[0; 32], "no size was stated"),
+        ("named.tif", b"hello, world", "its name is that of TIFF"),
+        ("samples.raw", &[0; 32], "without a stated size"),
         ("odd.hgt", &[0; 31], "no square"),
         ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0", "truncated"),
         (
@@ -193,8 +193,8 @@ fn damage(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     damaged
 }
 
-/// Thousands of damaged copies of every kind of file, in this process: each gives an error or a
-/// terrain, and the error is rarely "the decoder failed".
+/// Thousands of damaged copies of every kind of file, in this process: each results in an error or
+/// a terrain, and the error is rarely "the decoder failed".
 #[test]
 fn damaged_copies_of_good_files_never_panic() {
     let Some(folder) = shared("dem") else {
@@ -238,6 +238,8 @@ fn damaged_copies_of_good_files_never_panic() {
 }
 
 /// Opening a pipe waits for a writer, so it must be refused by its type before.
+///
+/// Safety: 29.
 #[cfg(unix)]
 #[test]
 fn pipes_and_devices_are_refused_unopened() {

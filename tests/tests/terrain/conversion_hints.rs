@@ -370,7 +370,7 @@ fn arrays_are_converted_by_numpy() {
     }
     // No command converts these to heights.
     for name in ["text.npy", "line.npy", "fields.npy"] {
-        assert_eq!(hint(&at.join(name)), "take a file with heights", "{name}");
+        assert_eq!(hint(&at.join(name)), "choose a file with heights", "{name}");
     }
 }
 

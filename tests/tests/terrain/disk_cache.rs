@@ -207,7 +207,7 @@ fn heights_are_right_with_a_damaged_cache() {
             bytes[last] ^= 0x80;
             bytes
         },
-        |_| b"a note of somebody else's".to_vec(),
+        |_| b"a note of another program".to_vec(),
     ];
     for (number, harm) in harms.into_iter().enumerate() {
         for (path, bytes) in &whole {

@@ -29,7 +29,7 @@ fn assert_field(raster: &Raster, (columns, rows): (u32, u32), band: u32, name: &
         for column in 0..columns {
             let found = raster.height(column, rows - 1 - row);
             if (column, row) == NO_DATA {
-                assert!(found.is_nan(), "{name}: {found} in the hole");
+                assert!(found.is_nan(), "{name}: {found} in the no-data");
             } else {
                 let expected = height(column, row) + 1000.0 * f64::from(band - 1);
                 assert_eq!(found, expected, "{name}: column {column}, row {row}");

@@ -10,7 +10,7 @@ use hapterra_tests::tiffs::{DATA, Directory, Values, floats_in_a_strip, placed, 
 use heightfield::disk_cache::DiskCache;
 use heightfield::{OpenOptions, Raster};
 
-/// Samples each way: 4.1 GB of single floats.
+/// Samples along each side: 4.1 GB of single floats.
 const SIDE: u32 = 32_000;
 /// Offset of the strip.
 const FIRST: u32 = 4096;
@@ -94,7 +94,7 @@ fn masked(compression: u32, mask: &[u8]) -> (tempfile::TempDir, PathBuf) {
         .write(true)
         .open(&path)
         .expect("there");
-    let length = file.metadata().expect("told").len();
+    let length = file.metadata().expect("read").len();
     file.set_len(length.max(u64::from(MASKED * MASKED)))
         .expect("a sparse file");
     (folder, path)
@@ -185,7 +185,7 @@ fn packed_strip_is_read_in_the_memory_of_a_terrain() {
     // Without a place on disk it needs memory, and there is too little.
     let (code, text) = info(&["--cache", "off"]);
     assert_eq!(code, Some(1), "{text}");
-    assert!(text.contains("more than memory can hold"), "{text}");
+    assert!(text.contains("do not fit into memory"), "{text}");
     // A truncated strip: the rows before the end are rendered.
     write(&packed[..packed.len() / 10 * 9]);
     let (code, text) = info(&["--cache", cache]);
@@ -284,8 +284,8 @@ fn search_of_a_file_without_heights_is_reported() {
     let output = memory_limit::info(&path, &["--input", "no-data=0"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{text}");
-    let search = text.find("32 places of").expect("it says that it searches");
-    let end = text.find("no surface").expect("it says what came of it");
+    let search = text.find("32 places of").expect("the search is reported");
+    let end = text.find("no surface").expect("its result is reported");
     assert!(search < end, "{text}");
     assert!(text.contains("all 144000000 samples"), "{text}");
     // If zeros are heights, the first samples already have one.

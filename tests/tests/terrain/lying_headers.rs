@@ -1,5 +1,5 @@
-//! Files read on demand that have wrong headers: windows, overviews, sizes. Each gives an error, or
-//! a terrain with the file's heights, within the memory for a terrain.
+//! Files read on demand that have wrong headers: windows, overviews, sizes. Each results in an
+//! error, or a terrain with the file's heights, within the memory for a terrain.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -114,11 +114,7 @@ fn overview_at_another_place_is_not_used() {
     let here = [400_000.0, 3_800_000.0];
     let cases = [
         ("it is one", overview(), true),
-        (
-            "it says that it is where the file is",
-            elsewhere(here, 60.0, 32611),
-            true,
-        ),
+        ("its path is reported", elsewhere(here, 60.0, 32611), true),
         ("in another system", elsewhere(here, 60.0, 32612), false),
         (
             "at another place",

@@ -389,7 +389,7 @@ fn mismatched_file_is_refused_with_its_name_and_reason() {
         ),
         ("xllcorner 4\nyllcorner 0\ncellsize 2", "2 × 2 units"),
         ("xllcorner 4e12\nyllcorner 0\ncellsize 1", "too far away"),
-        ("cellsize 1", "does not say where it lies"),
+        ("cellsize 1", "does not state its place"),
     ] {
         two_tiles(at, 0);
         let text = format!("ncols 2\nnrows 2\n{other}\n1 2 3 4\n");
@@ -414,7 +414,7 @@ fn mismatched_file_is_refused_with_its_name_and_reason() {
     assert!(refused(at.join("[")).contains("pattern"));
 }
 
-/// Any VRT gives a terrain or an error with a hint, within the memory for a terrain.
+/// Any VRT results in a terrain or an error with a hint, within the memory for a terrain.
 #[test]
 fn malformed_vrts_end_in_bounded_memory() {
     let place = folder();
@@ -504,7 +504,7 @@ fn hint_merges_files_that_do_not_match() {
     );
     let printed = output_text(&info(&at.join("my tiles")));
     assert!(printed.contains("b.tif its cells are"), "{printed}");
-    let (_, command) = printed.split_once("onto one grid: ").expect("a command");
+    let (_, command) = printed.split_once("to one grid: ").expect("a command");
     shell(at, command.trim());
     let one = open(at.join("one.tif"));
     assert!(one.columns() > 500 && one.summary().no_data < 200_000);

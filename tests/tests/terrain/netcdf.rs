@@ -1,6 +1,6 @@
 //! NetCDF files, through a libgdal of the machine: many ways to store a variable, written by
 //! NetCDF's and HDF5's libraries (`data/netcdf.py` has the command), and many attributes, written
-//! here. Reading on demand gives the same bits as reading the whole file.
+//! here. Reading on demand returns the same bits as reading the whole file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -308,7 +308,7 @@ fn depth_sign_follows_positive_then_standard_name() {
     let raster = open(&file, &OpenOptions::default());
     assert_eq!(raster.height(3, 0), 12.0);
     let remarks = raster.remarks().join(" ");
-    assert!(remarks.contains("positive says up"), "{remarks}");
+    assert!(remarks.contains("positive is up"), "{remarks}");
 }
 
 #[test]

@@ -373,6 +373,8 @@ fn grass_null_mark_is_refused_and_no_data_number_is_read() {
 
 /// A libgdal that needs 300 ms for each block delays no tick: until the blocks arrive the coarse
 /// fallback is under the hand, not no-data.
+///
+/// Safety: 29.
 #[test]
 fn slow_libgdal_delays_no_tick() {
     let folder = tempfile::tempdir().expect("a folder");

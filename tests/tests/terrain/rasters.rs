@@ -70,7 +70,7 @@ fn assert_heights(raster: &Raster, truth: &[f64], name: &str) {
         assert!(same, "{name}: {height} for {expected} at {column}, {row}");
     }
     let holes = truth.iter().filter(|height| height.is_nan()).count();
-    assert_eq!(raster.summary().no_data, holes as u64, "{name}: holes");
+    assert_eq!(raster.summary().no_data, holes as u64, "{name}: no-data");
 }
 
 /// Returns the expected heights of a variant, by its name and its line in the manifest.
@@ -458,7 +458,7 @@ fn files_too_small_for_a_surface_are_refused() {
 
 /// Height fields of the third-party collection open; colours are refused.
 #[test]
-fn third_party_tiffs_are_read_or_refused_for_what_they_are() {
+fn third_party_height_tiffs_are_read_and_colours_refused() {
     let Some(folder) = shared("dem/tiff_ok") else {
         return;
     };

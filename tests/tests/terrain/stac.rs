@@ -215,7 +215,7 @@ fn assets_whose_names_differ_are_chosen_by_a_pattern() {
     assert!(arguments.contains("no asset of that name"), "{arguments}");
 }
 
-/// A document of any size gives an error, within the program's own address space.
+/// A document of any size is an error, within the program's own address space.
 #[test]
 fn oversized_or_deep_documents_fail_in_bounded_memory() {
     let place = folder();

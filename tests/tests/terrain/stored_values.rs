@@ -31,7 +31,7 @@ fn hapterra(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn info_shows_what_is_stored() {
+fn info_shows_the_stored_values() {
     let folder = tempfile::tempdir().expect("a folder");
     write_noted(folder.path());
     let output = hapterra(folder.path(), &["info", "x.tif"]);

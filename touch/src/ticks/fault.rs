@@ -20,10 +20,10 @@ pub enum TickError<E> {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TimeFault {
     /// The time is NaN or infinite.
-    #[error("the time is not a finite number: give seconds")]
+    #[error("the time is not a finite number: state it in seconds")]
     NotFinite,
     /// The time is before that of the previous row.
-    #[error("time goes back from {from} s to {to} s")]
+    #[error("time decreases from {from} s to {to} s")]
     Backwards {
         /// Time of the previous row, s.
         from: f64,
@@ -43,7 +43,7 @@ pub enum TimeFault {
     },
     /// A move on a straight line is too long.
     #[error(
-        "the HIP moves during a gap of {step} s, from {from} s to {to} s: where it was meanwhile is not known; give seconds, or split the path there"
+        "the HIP moves during a gap of {step} s, from {from} s to {to} s: its path there is unknown; state times in seconds, or split the path there"
     )]
     Gap {
         /// Time of the previous row, s.
@@ -54,7 +54,9 @@ pub enum TimeFault {
         step: f64,
     },
     /// A rest is too long.
-    #[error("a gap of {step} s, from {from} s to {to} s: give seconds, or split the path there")]
+    #[error(
+        "a gap of {step} s, from {from} s to {to} s: state times in seconds, or split the path there"
+    )]
     Rest {
         /// Time of the previous row, s.
         from: f64,
@@ -64,11 +66,11 @@ pub enum TimeFault {
         step: f64,
     },
     /// The time is too far from zero to distinguish ticks.
-    #[error("numbers near {0} s are too far apart to tell ticks by them: begin at 0 s")]
+    #[error("numbers near {0} s are too far apart to separate ticks: begin at 0 s")]
     TooLarge(f64),
     /// The time is not at a tick of the recording.
     #[error(
-        "{to} s is {ticks} ticks after the row before, where the settings say {tick_hz} ticks a second"
+        "{to} s is {ticks} ticks after the row before, but the settings state {tick_hz} ticks a second"
     )]
     OffTick {
         /// Time of the row, s.

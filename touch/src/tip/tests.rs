@@ -104,7 +104,7 @@ struct BallOnHeights {
 }
 
 impl BallOnHeights {
-    /// Creates a ball of a radius in cells of a millimetre, over `cells` cells each way.
+    /// Creates a ball of a radius in cells of a millimetre, over `cells` cells in each direction.
     fn new(radius: f64, cells: usize, height: impl Fn(i32, i32) -> f64) -> Self {
         let ball = Ball::of(radius, 1.0);
         let parts = ball.parts() as usize;

@@ -49,7 +49,7 @@ const PLOTS: [Plot; 6] = [
     },
     Plot {
         entity: ENERGY,
-        series: &[("in the spring", TEAL), ("given to the hand", AMBER)],
+        series: &[("in the spring", TEAL), ("added to the hand", AMBER)],
     },
     Plot {
         entity: TICK,

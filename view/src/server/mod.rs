@@ -54,7 +54,7 @@ impl Server {
         });
         let server = server.ok_or(why).context("the page cannot be served")?;
         let address = server.server_addr().to_ip();
-        let address = address.context("the page's address is not known")?;
+        let address = address.context("the page's address is unknown")?;
         let shared = Arc::new(Shared {
             history,
             files,

@@ -50,7 +50,7 @@ impl Running {
 
     /// Starts `hapterra` with a viewer that ends with it.
     pub fn start_with_viewer(command: &mut Command, options: &str) -> Self {
-        Self::start(command, &format!("--linger 0 {options}"))
+        Self::start(command, &format!("--linger 0s {options}"))
     }
 
     /// Runs `hapterra` with such a viewer to its end and returns the output of both.
@@ -68,12 +68,13 @@ impl Running {
 
     /// Returns the next line on standard error.
     pub fn line(&self) -> String {
-        self.stderr.recv_timeout(HANG).expect("it says a line")
+        self.stderr.recv_timeout(HANG).expect("it prints a line")
     }
 
     /// Waits for a line on standard output with this beginning.
     pub fn wait_for_line(&self, beginning: &str) {
-        while !{ self.stdout.recv_timeout(HANG).expect("it tells a line") }.starts_with(beginning) {
+        while !{ self.stdout.recv_timeout(HANG).expect("it prints a line") }.starts_with(beginning)
+        {
         }
     }
 

@@ -47,7 +47,7 @@ pub(crate) fn demo(
     }
     if !is_served {
         report(format!(
-            "wrote the page: any web server can give out {}",
+            "wrote the page: any web server can serve {}",
             folder.display()
         ));
         return Ok(());

@@ -63,7 +63,7 @@ fn install(packages: &Packages) -> Result<()> {
     let mut managers = MANAGERS.iter().zip(packages);
     let here = managers.find(|((install, _), _)| on_path(program(install)).is_some());
     let Some(((install, unattended), names)) = here else {
-        bail!("no package manager known to this program (apt-get, dnf, pacman, brew) is here");
+        bail!("no supported package manager (apt-get, dnf, pacman, brew) is on the PATH");
     };
     let program = program(install);
     ensure!(!names.is_empty(), "{program} has no package for it");

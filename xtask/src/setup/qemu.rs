@@ -36,7 +36,7 @@ fn checked(qemu: PathBuf) -> Result<PathBuf> {
         .with_context(|| format!("{} does not run", qemu.display()))?;
     if !supports_board(&machines) {
         bail!(
-            "{} does not know the machine {MACHINE}: a newer QEMU does",
+            "{} does not support the machine {MACHINE}: install a newer QEMU",
             qemu.display()
         );
     }

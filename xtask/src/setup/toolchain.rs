@@ -85,7 +85,7 @@ pub(crate) fn ready() -> Result<Toolchain> {
         Err(_) | Ok("" | "auto") => either(),
         Ok("rustup") => own().context(MANUAL_STEPS),
         Ok("distribution") => from_distribution(),
-        Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: say rustup, distribution or auto"),
+        Ok(other) => bail!("HAPTERRA_TOOLCHAIN is {other}: set it to rustup, distribution or auto"),
     }
 }
 

@@ -55,7 +55,7 @@ fn check_saved(site: &mut Site, folder: &str, min_touching: usize) -> Option<Str
     let line = site.text("command");
     let words: Vec<_> = line.split(' ').skip(1).collect();
     program("HAPTERRA", &saved, &words, &[])?;
-    let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("felt.csv")));
+    let (rendered, replayed) = (forces(&files[0]), forces(&saved.join("forces.csv")));
     let touching = rendered.iter().filter(|force| **force != [0; 3]).count();
     println!("{} rows, {touching} with a force: {line}", rendered.len());
     assert!(touching > min_touching, "{touching} of {}", rendered.len());
@@ -155,7 +155,7 @@ fn dropped_files_of_one_terrain_have_the_same_heights() {
         assert!(difference.fold(0.0, f64::max) < 0.02);
     }
     site.drop_file("notes.txt", b"not a terrain");
-    site.wait("document.getElementById('said').textContent.startsWith('notes.txt: its kind is not known')");
+    site.wait("document.getElementById('said').textContent.startsWith('notes.txt: its format is not supported')");
     assert_eq!(site.value("hapterra.touch.terrain.nx"), 70);
     site.check_requests();
 }

@@ -55,7 +55,7 @@ impl Site {
         let copied = Command::new("cp").arg("-r").args([&built, &site]).status();
         assert!(copied.expect("cp").success());
         if let Some(terrain) = terrain {
-            let words = ["cut", "--most-samples", "5000", "--out"];
+            let words = ["cut", "--max-samples", "5000", "--out"];
             program("HAPTERRA", folder.path(), &words, &[&site, terrain])?;
         }
         let server = Server::bind(&site).expect("a port");

@@ -1,7 +1,7 @@
 //! Continuation of the descent from a point of a patch's border.
 //!
 //! The distance to the HIP has a slope into each patch that meets there. The descent continues into
-//! the patch with the steepest slope, so that a mirrored scene gives the mirrored patch. The
+//! the patch with the steepest slope, so that a mirrored scene results in the mirrored patch. The
 //! neighbour's closest point is computed before the proxy enters it.
 
 use super::on_patch::{Nearest, finest_resolution, resolution, search};
@@ -92,14 +92,14 @@ impl NeighbourSearch {
         best: None,
     };
 
-    /// Forgets the searched neighbours.
+    /// Clears the searched neighbours.
     #[inline]
     pub(super) const fn restart(&mut self) {
         self.searched = 0;
         self.best = None;
     }
 
-    /// Searches until the downhill direction is known. Sets `patch` to the patch of a best
+    /// Searches until the downhill direction is determined. Sets `patch` to the patch of a best
     /// candidate found in this call.
     #[inline]
     pub(super) fn advance<const D: usize>(
@@ -186,7 +186,7 @@ impl NeighbourSearch {
     /// Sets `next` to the unsearched neighbour with the steepest descent.
     ///
     /// # Errors
-    /// The reason why that neighbour is not known in this tick.
+    /// The reason why that neighbour is not available in this tick.
     // Not inlined, and fills `next` in place: otherwise its fields are copied back and forth.
     #[inline(never)]
     fn steepest<const D: usize>(

@@ -74,7 +74,7 @@ fn convex_solver_agrees_with_the_ruling_search() {
 }
 
 #[test]
-fn flat_patch_gives_the_projection_of_the_hip() {
+fn flat_patch_returns_the_projection_of_the_hip() {
     let (u, v) = convex([0.1, 0.2, 0.1, 0.2], (0.5, 0.25), (0.4, 0.4)).unwrap();
     let drop = 0.15 / 1.01 * 0.1;
     assert!((u - (0.5 - drop)).abs() < 1e-7 && v == 0.25, "{u} {v}");

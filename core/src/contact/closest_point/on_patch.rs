@@ -10,8 +10,8 @@
 //! because D is a parabola in u: a minimum of F is a minimum of D over the
 //! square, edges and corners included, and no saddle of D is one.
 //!
-//! The steeper of the two directions is eliminated: its closed form gives z without cancellation,
-//! unlike the height of a steep patch at a rounded v.
+//! The steeper of the two directions is eliminated: its closed form computes z without
+//! cancellation, unlike the height of a steep patch at a rounded v.
 //!
 //! `docs/explanation/contact.md` has the error analysis.
 
@@ -45,7 +45,7 @@ pub struct Nearest {
 ///
 /// `hip` is the haptic interface point in patch coordinates (u, v); it may lie
 /// outside the unit square. The heights of `patch` count from it. Finite input
-/// gives a finite answer. Up to slope 1 it is within 2·10⁻⁶ cell of the exact point;
+/// has a finite result. Up to slope 1 it is within 2·10⁻⁶ cell of the exact point;
 /// above, 4 in 4,000 are not (`search_error_is_below_2e_6_cell_on_any_slope`).
 ///
 /// ```
@@ -146,7 +146,7 @@ const fn swapped_if(is_transposed: bool, (u, v): (f32, f32)) -> (f32, f32) {
 
 /// Returns true if the patch is steeper northward than eastward at a place. If both slopes are
 /// equal, as at the foot of a raised corner, the HIP's direction decides, so that a mirrored scene
-/// gives the mirrored answer.
+/// has the mirrored result.
 fn is_steeper_north(patch: &Patch, (p, q): (f32, f32), (u, v): (f32, f32)) -> bool {
     let (east, north) = (patch.slope_u(v).abs(), patch.slope_v(u).abs());
     north > east || (north == east && (q - v).abs() > (p - u).abs())

@@ -56,7 +56,7 @@ impl DepartureRule {
 
 /// A proxy's path downhill to one HIP.
 ///
-/// It can be suspended after any piece of work and resumed later with the same bits: each step
+/// It can be suspended after any operation and resumed later with the same bits: each step
 /// depends only on this state, the terrain and the HIP.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Descent {
@@ -76,7 +76,7 @@ pub(in crate::contact) struct Descent {
 enum Stage {
     /// The patch was entered.
     Entered,
-    /// The patch was entered, and its closest point is known.
+    /// The patch was entered, and its closest point is computed.
     EnteredWithClosest,
     /// The neighbours are searched.
     SearchingNeighbours,
@@ -146,7 +146,8 @@ impl Descent {
         self.nearest_at_entry(window, view)
     }
 
-    /// Does the same as [`Self::nearest`], in the stages before the patch's closest point is known.
+    /// Does the same as [`Self::nearest`], in the stages before the patch's closest point is
+    /// computed.
     #[inline(never)]
     fn nearest_at_entry<const D: usize>(
         &self,
@@ -248,7 +249,7 @@ impl Descent {
         None
     }
 
-    /// Continues with the neighbours once the patch's closest point is known.
+    /// Continues with the neighbours once the patch's closest point is computed.
     #[inline]
     const fn start_neighbour_search(&mut self) {
         self.at = self.at.moved_to(self.here.u, self.here.v);
@@ -256,7 +257,7 @@ impl Descent {
         self.stage = Stage::SearchingNeighbours;
     }
 
-    /// Continues in a neighbouring patch, whose closest point is known.
+    /// Continues in a neighbouring patch, whose closest point is computed.
     fn enter<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

@@ -255,8 +255,8 @@ fn border_along(border: Side, direction: (f32, f32)) -> Side {
 
 impl PullState {
     /// Does the same as [`Self::evaluate`], at the end of a straight path, where patch and pull are
-    /// known: if the pull leads over one edge, only the patch beyond is evaluated. Along the edge
-    /// it offers the same directions.
+    /// computed: if the pull leads over one edge, only the patch beyond is evaluated. Along the
+    /// edge it offers the same directions.
     fn update<const D: usize>(
         &mut self,
         window: &Window<'_, D>,
@@ -316,7 +316,7 @@ impl PullState {
         self.pull = Pull::in_patch(&self.patch, view, &self.at, border);
         match border {
             Side::NONE if self.pull.is_above => {
-                // Nothing presses a proxy that must not leave here.
+                // No pressure acts on a proxy that must not leave here.
                 self.pull.press_sq = 0.0;
                 departure_end(departure_rule, &self.at)
             }

@@ -41,7 +41,7 @@ impl Contact {
         })
     }
 
-    /// Stops a free proxy that has to wait, at the end of the known free part of its path.
+    /// Stops a free proxy that has to wait, at the end of the checked free part of its path.
     pub(super) fn stop_at(&mut self, proxy: GridPoint) -> TickProgress {
         self.set_output(ContactOutput {
             state: ContactState::Free,

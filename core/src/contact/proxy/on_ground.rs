@@ -59,8 +59,8 @@ impl Contact {
         }
     }
 
-    /// Leaves the surface for the air, straight to the HIP. The path begins at the nearest known
-    /// point: in the entered patch, if the proxy leaves on its border.
+    /// Leaves the surface for the air, straight to the HIP. The path begins at the nearest point
+    /// found: in the entered patch, if the proxy leaves on its border.
     #[inline(never)]
     pub(super) fn depart<const D: usize>(
         &mut self,
@@ -86,7 +86,7 @@ impl Contact {
         TickProgress::Continue
     }
 
-    /// Sets the output in contact at the nearest known point, faded where the surface ends.
+    /// Sets the output in contact at the nearest point found, faded where the surface ends.
     pub(super) fn touch<const D: usize>(
         &mut self,
         window: &Window<'_, D>,

@@ -25,8 +25,8 @@ pub(super) struct Onset {
 impl Contact {
     /// Creates a contact whose proxy begins on the surface at the column of a place, with the
     /// vector `displacement` from the HIP to it, cells. No force is rendered before the terrain
-    /// there is known and [`Contact::place_on_surface`] has placed the HIP; then this share of it,
-    /// which grows to all.
+    /// there is available and [`Contact::place_on_surface`] has placed the HIP; then this share of
+    /// it, which grows to all.
     #[must_use]
     pub fn onset(settings: ContactSettings, at: GridPoint, displacement: Vec3, fade: f32) -> Self {
         Self {
@@ -57,8 +57,8 @@ impl Contact {
         }
     }
 
-    /// Puts the proxy of a landing contact onto the surface as soon as the terrain there is known,
-    /// and returns the HIP at the same depth as before. At no-data there is no contact.
+    /// Puts the proxy of a beginning contact onto the surface as soon as the terrain there is
+    /// available, and returns the HIP at the same depth as before. At no-data there is no contact.
     ///
     #[must_use]
     pub fn place_on_surface<const D: usize>(

@@ -44,13 +44,13 @@ pub(in crate::contact) enum SweepEnd {
 /// A sweep in progress: the proxy's place, and the pieces that are left.
 #[derive(Clone, Debug)]
 pub(in crate::contact) struct Path {
-    /// End of the known free part of the path.
+    /// End of the checked free part of the path.
     at: GridPoint,
     /// Ends of the remaining pieces, the last one first.
     ends: Vec<GridPoint, MAX_PIECES>,
     /// True if the path starts on the surface and leaves it.
     on_surface: bool,
-    /// True if the last cell passed holds no patch: no-data, or beyond the data.
+    /// True if the last cell passed has no patch: no-data, or beyond the data.
     over_no_data: bool,
     /// True if the sweep waits for a tile, and not for budget.
     is_missing: bool,
@@ -83,9 +83,9 @@ impl Path {
     /// Redirects the path to another place.
     ///
     /// A piece that is already partly intersected is completed first if it leads nearer to the new
-    /// place: if every motion of the HIP cancelled it, a piece that takes more than a tick would
-    /// never be completed. A piece that waits for a tile is cancelled, since the new path may not
-    /// need it.
+    /// place: if every motion of the HIP cancelled it, a piece that requires more than a tick
+    /// would never be completed. A piece that waits for a tile is cancelled, since the new path may
+    /// not need it.
     #[inline(never)]
     pub(in crate::contact) fn redirect(&mut self, to: GridPoint) {
         let leads_nearer =
@@ -99,7 +99,7 @@ impl Path {
         }
     }
 
-    /// Returns the end of the known free part of the path.
+    /// Returns the end of the checked free part of the path.
     pub(in crate::contact) const fn at(&self) -> GridPoint {
         self.at
     }
@@ -205,7 +205,7 @@ impl Path {
 /// Returns the cells under a piece of a path, and those on whose border it ends.
 fn with_borders(mut span: CellBox, end: &GridPoint) -> CellBox {
     if end.is_on_grid_line() {
-        // An extra cell does no harm.
+        // An extra cell is harmless.
         span.from = span.from.offset(-1, -1);
     }
     span

@@ -34,6 +34,7 @@ fn compared(measure: impl Fn(Vec3) -> Vec3) -> Option<u32> {
     None
 }
 
+/// Safety: 22.
 #[test]
 fn unready_amplifier_is_a_fault_in_the_third_tick() {
     let mut bench = Bench::armed();
@@ -75,6 +76,7 @@ fn currents_that_follow_commands_are_no_fault() {
     assert_eq!(compared(|a| a * 1.03 + 0.2), None);
 }
 
+/// Safety: 23.
 #[test]
 fn uncommanded_current_is_a_fault() {
     let open = compared(|a| Vec3::new(0.0, a.y, a.z));
@@ -97,6 +99,7 @@ fn oscillating(amplitude_a: f32, hz: f32) -> impl Fn(Vec3) -> Vec3 {
     }
 }
 
+/// Safety: 23.
 #[test]
 fn oscillating_amplifier_is_a_fault_at_any_frequency() {
     for hz in [333.0, 487.0, 970.0, 1_013.0, 2_477.0] {
@@ -105,6 +108,7 @@ fn oscillating_amplifier_is_a_fault_at_any_frequency() {
     }
 }
 
+/// Safety: 23.
 #[test]
 fn noisy_monitor_is_no_fault() {
     for hz in [333.0, 487.0, 970.0] {
@@ -112,6 +116,7 @@ fn noisy_monitor_is_no_fault() {
     }
 }
 
+/// Safety: 23.
 #[test]
 fn winding_temperature_follows_measured_not_commanded_current() {
     // Armed, and with the amplifiers off.
@@ -134,6 +139,7 @@ fn winding_temperature_follows_measured_not_commanded_current() {
     }
 }
 
+/// Safety: 23.
 #[test]
 fn implausible_monitor_currents_keep_motor_temperatures_valid() {
     let mut bench = Bench::new();
@@ -144,6 +150,7 @@ fn implausible_monitor_currents_keep_motor_temperatures_valid() {
     assert!(before.after_reset().is_some(), "{before:?}");
 }
 
+/// Safety: 23.
 #[test]
 fn current_with_the_amplifiers_off_is_a_fault() {
     let mut bench = Bench::new();
@@ -155,6 +162,7 @@ fn current_with_the_amplifiers_off_is_a_fault() {
     assert_eq!(bench.guard.report().fault, Some(Fault::CurrentMismatch));
 }
 
+/// Safety: 23.
 #[test]
 fn fastest_force_change_is_no_mismatch_for_late_amplifier() {
     let mut bench = Bench::armed();
@@ -180,6 +188,7 @@ fn missing_monitors_disable_current_comparison() {
     assert_eq!(bench.guard.report().fault, None);
 }
 
+/// Safety: 23, images.
 #[test]
 fn monitor_loss_is_a_fault_only_while_armed() {
     let mut bench = Bench::armed();

@@ -14,6 +14,7 @@ fn holding() -> Bench {
     bench
 }
 
+/// Safety: 19.
 #[test]
 fn outputs_are_held_within_full_scale_for_a_minute_at_most() {
     let mut bench = holding();
@@ -27,6 +28,7 @@ fn outputs_are_held_within_full_scale_for_a_minute_at_most() {
     assert_eq!(bench.guard.held_shares(), Vec3::ZERO);
 }
 
+/// Safety: 19.
 #[test]
 fn every_other_command_ends_the_hold() {
     let ends: [fn(&mut Bench); 7] = [
@@ -46,6 +48,7 @@ fn every_other_command_ends_the_hold() {
     }
 }
 
+/// Safety: 19.
 #[test]
 fn outputs_are_not_held_while_arming_armed_or_faulted() {
     let mut bench = Bench::new();

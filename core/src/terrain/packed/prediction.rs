@@ -2,7 +2,7 @@
 
 use crate::terrain::TILE_SAMPLES;
 
-/// The numbers of the last row, and of the known part of the present row.
+/// The numbers of the last row, and of the decoded part of the present row.
 pub(super) struct Prediction {
     /// Numbers of the present row, west of the next sample; east of it, of the last row.
     row: [i32; TILE_SAMPLES],

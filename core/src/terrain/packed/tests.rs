@@ -80,12 +80,12 @@ fn hills(metres_a_cell: f64, base: i32) -> [f32; SAMPLES] {
 }
 
 #[test]
-fn whole_metres_take_half_a_byte_per_sample() {
+fn whole_metres_use_half_a_byte_per_sample() {
     for metres in [1.0, 10.0, 29.97, 91.3] {
         let base = (1450.0 / metres) as i32;
         let steps = [HeightStep::Cells(1.0 / metres)];
         let bytes = packed(&hills(metres, base), base, &steps).unwrap();
-        assert_eq!(bytes[0] & 7, 1, "one line, no holes");
+        assert_eq!(bytes[0] & 7, 1, "one line, without no-data");
         assert!(bytes.len() < 600, "{}", bytes.len());
     }
 }

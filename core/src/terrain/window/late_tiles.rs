@@ -1,13 +1,13 @@
 //! Content of a window where no tile of the scene's level is rendered unchanged: before it arrives,
-//! and while it blends in ([`TileBlend`](super::TileBlend)).
+//! and while it blends in ([`BlendAllowances`](super::BlendAllowances)).
 
 use super::{CellContent, Corners, Window};
 use crate::grid::{Altitude, Cell, GridPoint};
 use crate::scalar::larger;
+use crate::terrain::blend_allowances::{Allowance, BlendAllowances, within};
 use crate::terrain::fallback::Fallback;
 use crate::terrain::index::{TILE_CELLS, TileIndex, TileKey};
 use crate::terrain::tile::Tile;
-use crate::terrain::tile_blend::{Allowance, TileBlend, within};
 
 /// Rendered height at a sample, with its source: a tile or the fallback.
 #[derive(Clone, Copy)]
@@ -61,7 +61,7 @@ impl<'t, const D: usize> Window<'t, D> {
         } else {
             self.fallback.set_place(fallback);
         }
-        self.tile_blend = TileBlend::NONE;
+        self.allowances = BlendAllowances::NONE;
         for row in 0..D {
             for col in 0..D {
                 self.slots[row][col].mark_as_surface();
@@ -93,7 +93,7 @@ impl<'t, const D: usize> Window<'t, D> {
             return Some(self.install(tile));
         }
         if let Some(part) = self.fallback.part(tile.key(), self.level()) {
-            self.tile_blend.has_changed = true;
+            self.allowances.has_changed = true;
             return self.fallback.put(part, tile);
         }
         let depends = |cell: Cell, index: TileIndex| {
@@ -117,8 +117,8 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Blends arrived tiles in by at most `step` cells. Returns true if the surface may have
     /// changed since the last tick.
     pub fn blend_tiles(&mut self, step: f32) -> bool {
-        let has_changed = core::mem::take(&mut self.tile_blend.has_changed);
-        if self.tile_blend.count == 0 {
+        let has_changed = core::mem::take(&mut self.allowances.has_changed);
+        if self.allowances.count == 0 {
             return has_changed;
         }
         self.blend_each(step);
@@ -127,10 +127,10 @@ impl<'t, const D: usize> Window<'t, D> {
 
     #[inline(never)]
     fn blend_each(&mut self, step: f32) {
-        let mut remaining = self.tile_blend.count;
+        let mut remaining = self.allowances.count;
         for slot in 0..D * D {
             let (row, col) = (slot / D, slot % D);
-            let Allowance { now, end } = &mut self.tile_blend.slots[row][col];
+            let Allowance { now, end } = &mut self.allowances.slots[row][col];
             if *now == f32::INFINITY {
                 continue;
             }
@@ -140,7 +140,7 @@ impl<'t, const D: usize> Window<'t, D> {
                 tile.mark_as_surface();
                 let (key, top) = (tile.key(), tile.top());
                 if let Some(key) = key {
-                    self.tile_blend.begin(key.index, None);
+                    self.allowances.begin(key.index, None);
                     self.update_maxima(key.index, top);
                 }
             }
@@ -154,16 +154,16 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Records a tile that has arrived in the slot of `index`. It blends in if `blends` is true
     /// and the fallback was rendered there. If the same tile was there before, its blend continues.
     pub(super) fn record_arrival(&mut self, index: TileIndex, blends: bool, was_here: bool) {
-        let (row, col) = TileBlend::<D>::slot(index);
-        self.tile_blend.has_changed = self.fallback.is_set();
-        if was_here && self.tile_blend.allowed(index) < f32::INFINITY {
+        let (row, col) = BlendAllowances::<D>::slot(index);
+        self.allowances.has_changed = self.fallback.is_set();
+        if was_here && self.allowances.allowed(index) < f32::INFINITY {
             return;
         }
         let end = match blends && !was_here {
             true => self.max_distance(self.slots[row][col], index),
             false => None,
         };
-        self.tile_blend.begin(index, end);
+        self.allowances.begin(index, end);
         if end.is_none() {
             self.slots[row][col].mark_as_surface();
         }
@@ -192,7 +192,7 @@ impl<'t, const D: usize> Window<'t, D> {
         // The heights, if no other tile shares the samples.
         let alone = match own {
             Some(tile) => {
-                let (own, allowed) = (tile.corners(cell), self.tile_blend.allowed(index));
+                let (own, allowed) = (tile.corners(cell), self.allowances.allowed(index));
                 let blended = |corner: usize| within(own[corner], coarse[corner], allowed);
                 [blended(0), blended(1), blended(2), blended(3)]
             }
@@ -251,7 +251,7 @@ impl<'t, const D: usize> Window<'t, D> {
         for west in 0..=i32::from(is_on_border(sample.x)) {
             for south in 0..=i32::from(is_on_border(sample.y)) {
                 let index = TileIndex::containing(sample.offset(-west, -south));
-                let allowed = self.tile_blend.allowed(index);
+                let allowed = self.allowances.allowed(index);
                 if allowed <= max_allowed {
                     continue;
                 }
@@ -275,7 +275,7 @@ impl<'t, const D: usize> Window<'t, D> {
     /// Returns the tile if it is in its slot, rendered unchanged or not.
     #[inline(never)]
     fn tile_here(&self, index: TileIndex) -> Option<&Tile> {
-        let (row, col) = TileBlend::<D>::slot(index);
+        let (row, col) = BlendAllowances::<D>::slot(index);
         let tile = &*self.slots[row][col];
         tile.key()
             .is_some_and(|key| key.index == index)

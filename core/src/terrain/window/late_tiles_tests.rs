@@ -179,7 +179,7 @@ impl<'t> TestWindow<'t> {
                     CellContent::Patch(Corners { base, heights }) => {
                         for (height, model) in heights.iter().zip(model) {
                             let height = f64::from(base) + f64::from(*height);
-                            let model = model.expect("the model has it, too");
+                            let model = model.expect("the model has it");
                             assert!((height - model).abs() < 2e-5, "{x} {y}: {height} {model}");
                         }
                         patches += 1;
@@ -353,7 +353,7 @@ fn no_data_of_a_tile_takes_effect_without_blending() {
             heights: [height; 4],
         })
     };
-    assert_eq!(ground(&test, 135, 150), patch(1.25), "it settles");
+    assert_eq!(ground(&test, 135, 150), patch(1.25), "the blend ends");
     assert_eq!(
         ground(&test, 140, 140),
         patch(2.0),
@@ -492,7 +492,7 @@ fn no_buffer_is_lost_or_duplicated() {
 /// The sample in the middle of the hand's tile that is farthest above or below the fallback.
 fn sample_farthest_from_fallback(up: bool) -> (i32, i32) {
     let rise = |&(x, y): &(i32, i32)| {
-        let rise = hills(x, y) - coarse(x, y).expect("known");
+        let rise = hills(x, y) - coarse(x, y).expect("stored");
         if up { rise } else { -rise }
     };
     let all = (130..158).flat_map(|x| (130..158).map(move |y| (x, y)));
@@ -511,7 +511,7 @@ fn render_under_still_hand(friction: Friction, up: bool, above: f64) -> Vec<(f64
     let settings = ContactSettings::AT_1_KHZ.with_friction(friction);
     let mut contact = Box::new(Contact::new(settings));
     let (x, y) = sample_farthest_from_fallback(up);
-    let z = (coarse(x, y).expect("known") + above) as f32;
+    let z = (coarse(x, y).expect("stored") + above) as f32;
     let over = |z| GridPoint::new([x, y, 0], Vec3::new(0.01, 0.02, z));
     contact.step(&test.window, &over(60.0));
     (0..300)
@@ -585,7 +585,7 @@ fn hand_passed_by_the_surface_does_not_fall_through() {
     let mut memory = memory();
     let mut test = TestWindow::with_fallback(&mut memory);
     let mut contact = Box::new(Contact::new(ContactSettings::AT_1_KHZ));
-    let z = (coarse(x, y).expect("known") + 0.1) as f32;
+    let z = (coarse(x, y).expect("stored") + 0.1) as f32;
     let hip = GridPoint::new([x, y, 0], Vec3::new(0.01, 0.01, z));
     contact.step(&test.window, &GridPoint::new([x, y, 60], Vec3::ZERO));
     assert_eq!(contact.step(&test.window, &hip).state, ContactState::Free);

@@ -66,7 +66,9 @@ impl CalibrationMemory {
     /// because an erase takes long and nothing waits yet. Without a flash, nothing is stored.
     pub(crate) fn open(flash: Option<Flash<'static, Blocking>>) -> (Self, Stored) {
         let Some(flash) = flash else {
-            defmt::warn!("no memory for calibrations: the option bytes give the flash one bank");
+            defmt::warn!(
+                "no memory for calibrations: the option bytes configure the flash as one bank"
+            );
             return (Self(RefCell::new(None)), Stored::Missing);
         };
         let mut store = CalibrationStore::new(Uncached(flash), CALIBRATIONS, CALIBRATIONS_SIZE);

@@ -49,7 +49,7 @@ impl<const HZ: u32, const PER_COUNT: u32> CycleClock<HZ, PER_COUNT> {
         let counts_a_second = HZ / PER_COUNT;
         assert!(
             counts_a_second.is_multiple_of(TICK_HZ),
-            "build.rs knows another clock of this timer"
+            "build.rs assumes another clock of this timer"
         );
         (counts_a_second / TICK_HZ - 1) as u16
     };

@@ -156,7 +156,8 @@ fn store_record(record: CrashRecord) {
     write_back(place as usize, CRASH_BYTES);
 }
 
-/// Takes the record of the program before this one, once, before any interrupt is enabled.
+/// Reads and clears the record of the program before this one, once, before any interrupt is
+/// enabled.
 pub(crate) fn take_record() -> Option<Crash> {
     // SAFETY: nothing writes it now, and any bits are valid bytes. Its checksum shows if they are a
     // record.

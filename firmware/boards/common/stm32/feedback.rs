@@ -56,7 +56,7 @@ pub(crate) struct Monitors {
 }
 
 impl Monitors {
-    /// Takes the converter and the channels of axes 1 to 3. Starts the first sequence.
+    /// Claims the converter and the channels of axes 1 to 3. Starts the first sequence.
     pub(crate) fn new(
         adc: Adc<'static, ADC1>,
         channels: [AnyAdcChannel<'static, ADC1>; 3],

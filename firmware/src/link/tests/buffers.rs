@@ -122,7 +122,7 @@ fn rejected_tile_is_requested_again() {
     answer(&mut link, first[0]);
     assert!(
         !requested_tiles(&mut link).contains(&first[0]),
-        "it is thought held"
+        "it counts as stored"
     );
     for tile in tiles_handed_over(&mut loop_ends) {
         assert!(loop_ends.spent.enqueue(tile).is_ok());

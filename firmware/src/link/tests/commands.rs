@@ -20,7 +20,7 @@ fn jog_is_answered_while_fourteen_commands_wait() {
     let mut rig = Rig::new();
     rig.send_message(&ToDevice::Hello(HELLO));
     rig.run(1);
-    // All of it arrives before the loop takes a command.
+    // All of it arrives before the loop accepts a command.
     for _ in 0..14 {
         rig.request(Request::Disarm);
     }

@@ -25,7 +25,7 @@ const TO_ARM: fn(&Request) -> bool = |r| matches!(r, Request::Arm);
 fn arming_reports_each_mode_from_disarmed_to_armed() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
     rig.run(10);
-    let report = rig.report().expect("told");
+    let report = rig.report().expect("reported");
     assert_eq!(report.mode, Mode::Disarmed);
     assert!(report.blockers.contains(Blockers::NOT_ZEROED));
     rig.arm();
@@ -66,6 +66,7 @@ fn impossible_arm_request_is_refused_with_its_reason() {
     assert_eq!(rig.answers(|r| matches!(r, Request::DropScene)), [Ok(())]);
 }
 
+/// Safety: 5.
 #[test]
 fn fault_is_latched_reported_and_cleared_on_request() {
     let mut rig = Rig::armed();
@@ -76,7 +77,7 @@ fn fault_is_latched_reported_and_cleared_on_request() {
     assert_eq!(rig.report().and_then(|r| r.fault), Some(Fault::EncoderJump));
     assert!(!rig.device.tick(rig.sense).enabled);
     rig.sense.counts = [0; 3];
-    // Another fault, or none, was seen: this one stays.
+    // Another fault, or none, was reported: this one stays.
     for acknowledged in [None, Some(Fault::Hardware)] {
         rig.request(Request::ClearFault {
             fault: acknowledged,
@@ -97,6 +98,7 @@ fn fault_is_latched_reported_and_cleared_on_request() {
     rig.arm();
 }
 
+/// Safety: 33.
 #[test]
 fn settings_do_not_change_while_armed() {
     let mut rig = Rig::armed();
@@ -154,6 +156,7 @@ fn calibration_is_checked_applied_and_stored() {
     }
 }
 
+/// Safety: 18, images.
 #[test]
 fn calibration_store_times_out_without_deadman_press() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -164,7 +167,7 @@ fn calibration_store_times_out_without_deadman_press() {
         rig.run(1_100);
         rig.send_message(&ToDevice::Heartbeat);
     }
-    assert_eq!(rig.answers(TO_STORE), [], "it may take its time");
+    assert_eq!(rig.answers(TO_STORE), [], "it may be slow");
     rig.run(400);
     let refused = Err(Refusal::NotPressed);
     assert_eq!(rig.answers(TO_STORE), [refused]);
@@ -182,6 +185,7 @@ fn calibration_change_is_refused_while_store_awaits_press() {
     assert_eq!(rig.answers(TO_SET), [Err(Refusal::Busy)]);
 }
 
+/// Safety: 18.
 #[test]
 fn press_for_another_host_or_to_arm_stores_nothing() {
     let before = Stored::Found(Calibration::PREMIUM_1_5);
@@ -217,6 +221,8 @@ fn clock_does_not_stop_while_a_press_is_awaited() {
 
 /// A record's limits do not justify its own values: each value is refused by name when the record
 /// is set and when it is found at the start.
+///
+/// Safety: 18.
 #[test]
 fn record_above_absolute_limit_is_refused_and_raises_fault() {
     type Case = (fn(&mut Calibration), CalibrationField);
@@ -320,7 +326,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
         rig.run(1);
         ticks += 1;
         on += u32::from(rig.report().is_some_and(|r| r.mode.is_driving()));
-        assert!(ticks < 400, "for ever");
+        assert!(ticks < 400, "time-out of the test");
     }
     assert!((90..=102).contains(&on), "{on}");
     assert!((on..on + 105).contains(&ticks), "{ticks}");
@@ -335,7 +341,7 @@ fn close_is_confirmed_after_force_fade_and_scene_drop() {
     let ToHost::Hello(hello) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
     };
-    assert_eq!(hello.epoch, None, "it holds nothing any more");
+    assert_eq!(hello.epoch, None, "it no longer stores a scene");
     assert_eq!(hello.last.end, SessionEnd::Goodbye);
 }
 
@@ -350,13 +356,14 @@ fn clock_keeps_running_while_force_fades_out() {
             break;
         }
         ticks += 1;
-        assert!(ticks < 200, "for ever");
+        assert!(ticks < 200, "time-out of the test");
     }
     assert!(ticks > 90, "{ticks}");
     rig.run(1);
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
 }
 
+/// Safety: 39.
 #[test]
 fn stalled_link_task_disables_output_within_forty_ms() {
     let mut rig = Rig::armed();

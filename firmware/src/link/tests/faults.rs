@@ -57,6 +57,7 @@ fn host_of_another_protocol_does_not_end_a_session() {
     assert_eq!(rig.refused.len(), 1);
 }
 
+/// Safety: 32.
 #[test]
 fn messages_of_another_session_are_ignored() {
     let mut rig = Rig::armed();
@@ -97,13 +98,14 @@ fn repeated_hello_changes_nothing() {
         next += telemetry.samples.len() as u32;
     }
     assert!(next > 250, "{next}");
-    // The request was done once before the open message and is known after it.
+    // The request was done once before the open message and is answered after it.
     rig.number -= 1;
     rig.request(Request::Disarm);
     rig.run(1);
     assert_eq!(rig.answers(|r| matches!(r, Request::Disarm)), [Ok(()); 2]);
 }
 
+/// Safety: 32.
 #[test]
 fn open_of_previous_session_is_answered_as_replaced() {
     let mut rig = Rig::armed();
@@ -137,6 +139,7 @@ fn open_of_previous_session_is_answered_as_replaced() {
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
 }
 
+/// Safety: 25.
 #[test]
 fn session_closed_answers_silent_host_but_not_departed_host() {
     let mut rig = Rig::armed();
@@ -168,6 +171,7 @@ fn session_closed_answers_silent_host_but_not_departed_host() {
     assert_eq!(closed(&mut rig, 7), []);
 }
 
+/// Safety: 32.
 #[test]
 fn duplicate_request_is_executed_once() {
     let mut rig = Rig::armed();
@@ -203,6 +207,7 @@ fn numbers_of_requests_wrap_around() {
     assert_eq!(rig.received.iter().filter(answers).count(), 600);
 }
 
+/// Safety: 25, response times.
 #[test]
 fn host_silence_disarms_after_host_time_out() {
     let mut rig = Rig::armed();
@@ -213,7 +218,7 @@ fn host_silence_disarms_after_host_time_out() {
     rig.send_message(&ToDevice::Hello(hello));
     rig.run(1);
     for _ in 0..6_900 {
-        assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
+        assert!(rig.device.tick(rig.sense).enabled, "rendering continues");
     }
     // A frame of this session restarts the host's time-out.
     rig.send_message(&ToDevice::Heartbeat);
@@ -231,10 +236,11 @@ fn host_silence_disarms_after_host_time_out() {
         panic!("{:?}", rig.received[0]);
     };
     assert_eq!(device.last.end, SessionEnd::HostSilent);
-    assert_eq!(device.epoch, Some(7), "and it holds the scene");
+    assert_eq!(device.epoch, Some(7), "and it stores the scene");
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
 }
 
+/// Safety: 32.
 #[test]
 fn read_only_host_opens_no_session_and_keeps_none_armed() {
     let mut rig = Rig::armed();
@@ -314,7 +320,7 @@ fn heartbeats_keep_session_armed() {
 }
 
 /// Returns the answer that a new host receives to its open message.
-fn greeted(rig: &mut Rig) -> DeviceHello {
+fn opened_by_new_host(rig: &mut Rig) -> DeviceHello {
     rig.received.clear();
     rig.open_new_session();
     rig.run(5);
@@ -341,6 +347,7 @@ fn open_and_detach(rig: &mut Rig, silence_s: u16) {
     }
 }
 
+/// Safety: 25.
 #[test]
 fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     let mut rig = Rig::armed();
@@ -349,7 +356,7 @@ fn detached_sessions_keep_arm_armed_and_last_report_intact() {
     let second = rig.session;
     open_and_detach(&mut rig, 60);
     rig.run(500);
-    assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
+    assert!(rig.device.tick(rig.sense).enabled, "rendering continues");
     // Its own late open message does not open it again, and neither does that of the previous
     // session, which is answered.
     rig.received.clear();
@@ -363,14 +370,15 @@ fn detached_sessions_keep_arm_armed_and_last_report_intact() {
         rig.received_before,
         [(second, ToHost::SessionClosed { number, end })]
     );
-    let device = greeted(&mut rig);
+    let device = opened_by_new_host(&mut rig);
     let (session, end) = (device.last.session, device.last.end);
     assert_eq!((session, end), (first.get(), SessionEnd::Replaced));
     assert!(device.last.count.sent > 2_000, "{:?}", device.last);
-    assert_eq!(device.epoch, Some(7), "and it holds the scene");
+    assert_eq!(device.epoch, Some(7), "and it stores the scene");
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Armed));
 }
 
+/// Safety: 25.
 #[test]
 fn silence_after_detach_disarms_after_time_out() {
     let mut rig = Rig::armed();
@@ -378,7 +386,10 @@ fn silence_after_detach_disarms_after_time_out() {
     let on = (0..20_000).take_while(|_| rig.device.tick(rig.sense).enabled);
     let on = on.count();
     assert!((6_990..7_110).contains(&on), "{on}");
-    assert_eq!(greeted(&mut rig).last.end, SessionEnd::HostSilent);
+    assert_eq!(
+        opened_by_new_host(&mut rig).last.end,
+        SessionEnd::HostSilent
+    );
     assert_eq!(rig.report().map(|r| r.mode), Some(Mode::Disarmed));
 }
 
@@ -401,9 +412,10 @@ fn detached_host_arms_nothing_and_later_close_disarms() {
     rig.run(250);
     assert!(matches!(rig.received.last(), Some(ToHost::Goodbye(_))));
     assert!(!rig.device.tick(rig.sense).enabled);
-    assert_eq!(greeted(&mut rig).last.end, SessionEnd::Goodbye);
+    assert_eq!(opened_by_new_host(&mut rig).last.end, SessionEnd::Goodbye);
 }
 
+/// Safety: 32.
 #[test]
 fn pending_arm_request_ends_with_its_session() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -463,6 +475,7 @@ fn repeated_close_gets_same_answer_and_ends_requests() {
     assert_eq!(rig.answers(|r| matches!(r, Request::Arm)).len(), 1);
 }
 
+/// Safety: images.
 #[test]
 fn damaged_frames_trigger_no_repeated_tile_requests() {
     let mut rig = Rig::with_unanswered_tiles(scene(Source::Encoders));
@@ -549,7 +562,7 @@ fn point_repeated_before_its_answer_is_rendered_once() {
         rig.send(&point(0, 0.0, 2.0));
         rig.run(5);
     }
-    assert_eq!(rig.rendered(), [], "its tile is not there yet");
+    assert_eq!(rig.rendered(), [], "its tile has not arrived yet");
     rig.send(&tile(7, rig.tile_requests()[0]));
     rig.answers_tiles = true;
     rig.run(1000);
@@ -579,11 +592,7 @@ fn late_duplicate_does_not_replace_a_received_tile() {
         .iter()
         .map(|key| (key.index.col, key.index.row))
         .collect();
-    assert_eq!(
-        requested.len(),
-        unique.len(),
-        "nothing had to be asked for twice"
-    );
+    assert_eq!(requested.len(), unique.len(), "nothing was requested twice");
     assert_eq!(forces(&rendered[1..]), undisturbed());
 }
 
@@ -611,6 +620,7 @@ fn zero_byte_before_hello_ends_an_unfinished_frame() {
     assert!(matches!(rig.received[0], ToHost::Hello(_)));
 }
 
+/// Safety: 33.
 #[test]
 fn session_continues_after_garbage() {
     let mut rig = Rig::in_scene(scene(Source::Points));
@@ -624,7 +634,7 @@ fn session_continues_after_garbage() {
     rig.send(&storm);
     rig.send(&[0]);
     rig.run(2);
-    assert!(rig.in_transit.is_empty(), "all was taken");
+    assert!(rig.in_transit.is_empty(), "all was sent");
     assert_eq!(forces(&rig.descend(40)), undisturbed());
 }
 
@@ -632,10 +642,10 @@ fn session_continues_after_garbage() {
 fn force_stays_when_the_host_dies_and_the_session_resumes() {
     let mut rig = Rig::armed();
     let requested = rig.tile_requests().len();
-    // Gone: nothing is read, nothing is sent.
+    // The host has left: nothing is read, nothing is sent.
     rig.writer = 0;
     for _ in 0..1000 {
-        assert!(rig.device.tick(rig.sense).enabled, "rendering goes on");
+        assert!(rig.device.tick(rig.sense).enabled, "rendering continues");
     }
     rig.device.link.interrupted();
     rig.writer = usize::MAX;
@@ -646,14 +656,14 @@ fn force_stays_when_the_host_dies_and_the_session_resumes() {
     let ToHost::Hello(device) = &rig.received[0] else {
         panic!("{:?}", rig.received[0]);
     };
-    assert_eq!(device.epoch, Some(7), "it says what it still holds");
+    assert_eq!(device.epoch, Some(7), "it reports the stored scene");
     assert!(
         requested > 0 && rig.tile_requests().is_empty(),
-        "and asks for none of it"
+        "and requests none of its tiles"
     );
     let first = &rig.telemetry()[0];
     assert_eq!(first.first, 0, "a session counts its samples from zero");
-    assert!(first.samples[0].tick > 1000, "but the scene went on");
+    assert!(first.samples[0].tick > 1000, "but the scene continued");
 }
 
 #[test]
@@ -670,7 +680,7 @@ fn host_with_another_scene_requests_all_tiles_again() {
     rig.run(5);
     assert!(
         !rig.tile_requests().is_empty(),
-        "what it held is of another scene"
+        "its stored tiles are of another scene"
     );
     assert_eq!(forces(&rig.descend(40)), undisturbed());
 }
@@ -715,7 +725,7 @@ fn slow_link_drops_and_counts_only_telemetry() {
         rig.run(3000);
         rig.tile_requests()
     };
-    assert_eq!(tile_requests, fast, "every tile was asked for once");
+    assert_eq!(tile_requests, fast, "every tile was requested once");
 }
 
 #[test]
@@ -743,17 +753,18 @@ fn missing_tile_is_requested_again_after_two_heartbeats() {
     assert_eq!(
         rig.tile_requests().len(),
         requested,
-        "damage alone is no reason to ask again"
+        "damage alone causes no new request"
     );
     rig.send_message(&ToDevice::Heartbeat);
     rig.run(20);
-    assert_eq!(rig.tile_requests().len(), requested, "it may be on its way");
+    assert_eq!(rig.tile_requests().len(), requested, "it may be in transit");
     rig.answers_tiles = true;
     rig.send_message(&ToDevice::Heartbeat);
     rig.run(20);
-    assert!(!rig.device.link.may_stop_clock(), "time goes on");
+    assert!(!rig.device.link.may_stop_clock(), "time continues");
 }
 
+/// Safety: 33.
 #[test]
 fn flooding_host_is_throttled_without_loss() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -762,7 +773,7 @@ fn flooding_host_is_throttled_without_loss() {
     let same = frame(&ToDevice::Scene(scene(Source::Encoders)));
     rig.send(&vec![&*same; 500].concat());
     rig.run(50);
-    assert!(!rig.in_transit.is_empty(), "answers have nowhere to go");
+    assert!(!rig.in_transit.is_empty(), "answers cannot be sent");
     rig.writer = usize::MAX;
     rig.run(600);
     assert!(rig.in_transit.is_empty());
@@ -770,6 +781,7 @@ fn flooding_host_is_throttled_without_loss() {
     assert_eq!(rig.received.iter().filter(accepted).count(), 501);
 }
 
+/// Safety: 25.
 #[test]
 fn dead_man_press_without_live_host_neither_arms_nor_stores() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -785,7 +797,7 @@ fn dead_man_press_without_live_host_neither_arms_nor_stores() {
     rig.run(3_000);
     rig.press();
     assert_eq!(rig.device.link.to_store(), None);
-    // A host that is present may take its time.
+    // A host that is present may be slow.
     rig.request(Request::Arm);
     for _ in 0..10 {
         rig.run(1_000);

@@ -24,6 +24,7 @@ fn enter_loader_is_refused_without_a_loader() {
     assert!(!is_loader_due(&rig));
 }
 
+/// Safety: 36.
 #[test]
 fn armed_device_does_not_enter_its_loader() {
     let mut rig = Rig::armed();
@@ -58,6 +59,7 @@ fn device_awaiting_a_press_does_not_enter_its_loader() {
     assert!(!is_loader_due(&rig));
 }
 
+/// Safety: 36.
 #[test]
 fn arming_is_refused_once_loader_entry_is_accepted() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));
@@ -88,6 +90,7 @@ fn loader_is_entered_only_after_the_answer_is_sent() {
     assert!(is_loader_due(&rig));
 }
 
+/// Safety: images.
 #[test]
 fn held_outputs_are_released_before_loader_entry() {
     let mut rig = Rig::in_scene(scene(Source::Encoders));

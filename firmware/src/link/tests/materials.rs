@@ -52,7 +52,7 @@ fn is_accepted(rig: &Rig, epoch: u32) -> bool {
     answers.last().is_some_and(|answer| answer.1)
 }
 
-fn greeted() -> Rig {
+fn opened() -> Rig {
     let mut rig = Rig::new();
     rig.answers_tiles = false;
     rig.send_message(&ToDevice::Hello(HELLO));
@@ -96,7 +96,7 @@ fn rendered(rig: &mut Rig) -> f32 {
 
 #[test]
 fn tile_is_rendered_with_its_own_material() {
-    let mut rig = greeted();
+    let mut rig = opened();
     let table = table(&[0.4, 1.0, 0.8]);
     assert!(send_scene(&mut rig, scene_of(&table, 9), &table));
     answer_tiles(&mut rig, 9, TileMaterials::One(2));
@@ -113,7 +113,7 @@ fn tile_is_rendered_with_its_own_material() {
 
 #[test]
 fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
-    let mut rig = greeted();
+    let mut rig = opened();
     let table = table(&[0.5, 1.0]);
     assert!(send_scene(&mut rig, scene_of(&table, 9), &table));
     let key = rig.tile_requests()[0];
@@ -143,7 +143,7 @@ fn tiles_whose_materials_are_missing_or_wrong_are_bad_frames() {
 
 #[test]
 fn scene_with_missing_or_invalid_material_table_is_refused() {
-    let mut rig = greeted();
+    let mut rig = opened();
     let (known, other) = (table(&[0.5, 1.0]), table(&[0.5, 2.0]));
     let alone = scene_of(&known, 9);
     rig.send_message(&ToDevice::Scene(alone));
@@ -173,7 +173,7 @@ fn scene_with_missing_or_invalid_material_table_is_refused() {
 
 #[test]
 fn consecutive_scenes_use_their_own_material_tables() {
-    let mut rig = greeted();
+    let mut rig = opened();
     let (soft, hard) = (table(&[0.5]), table(&[1.0]));
     let mut buffer = [0; MAX_TABLE_BYTES];
     for (epoch, table) in [(1, &soft), (2, &hard), (3, &soft), (4, &soft), (5, &hard)] {
@@ -196,7 +196,7 @@ fn consecutive_scenes_use_their_own_material_tables() {
 
 #[test]
 fn fallback_tile_with_materials_is_a_bad_frame() {
-    let mut rig = greeted();
+    let mut rig = opened();
     let table = table(&[0.5, 1.0]);
     let wide = CoarseTile {
         first: Cell::new(0, 0),

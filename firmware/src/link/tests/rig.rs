@@ -115,7 +115,7 @@ pub(super) struct Rig {
     reader: Box<FrameReader<8192>>,
     /// Bytes to the device that it has not read yet.
     pub(super) in_transit: VecDeque<u8>,
-    /// Bytes that the writer takes in a step; `usize::MAX` for a fast one.
+    /// Bytes that the writer accepts in a step; `usize::MAX` for a fast one.
     pub(super) writer: usize,
     pub(super) received: Vec<ToHost>,
     /// The session of a host that only reads, if there is one.
@@ -253,7 +253,7 @@ impl Rig {
 
     /// Closes the session and reads while there are messages. No more ticks: the program may be
     /// about to end.
-    pub(super) fn send_goodbye(&mut self) {
+    pub(super) fn send_bye(&mut self) {
         self.send_message(&ToDevice::Bye);
         self.deliver();
         assert!(!self.device.link.has_ended());

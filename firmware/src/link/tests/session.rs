@@ -112,14 +112,17 @@ fn close_is_confirmed_after_all_samples_are_sent() {
     // The writer stops for a while: more than one message is waiting.
     rig.writer = 0;
     rig.run(20);
-    rig.send_goodbye();
+    rig.send_bye();
     let Some(ToHost::Goodbye(count)) = rig.received.last() else {
         panic!("{:?}", rig.received.last());
     };
     let count = *count;
     let samples: usize = rig.telemetry().iter().map(|t| t.samples.len()).sum();
     assert_eq!(samples, count.sent as usize);
-    assert!(samples >= 40, "the last, short batch came too: {samples}");
+    assert!(
+        samples >= 40,
+        "the last, short batch was also sent: {samples}"
+    );
 }
 
 #[test]

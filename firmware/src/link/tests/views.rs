@@ -58,7 +58,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     assert_eq!(scene_answers(&rig), [(1_001, true)]);
     assert!(
         !rig.tile_requests().is_empty(),
-        "its own tiles are asked for"
+        "its own tiles are requested"
     );
     assert_eq!((rig.latest().view, rig.latest().mode), (1, Mode::Armed));
     // Repeated, because the answer was lost.
@@ -89,6 +89,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     );
 }
 
+/// Safety: 15.
 #[test]
 fn placement_during_contact_is_refused() {
     let mut rig = Rig::armed();
@@ -98,7 +99,7 @@ fn placement_during_contact_is_refused() {
     rig.run(20);
     assert_eq!(scene_answers(&rig), [(1_001, false)]);
     assert_eq!((rig.latest().view, rig.latest().mode), (0, Mode::Armed));
-    // The clutch was held and then released: this is no better.
+    // The clutch was held and then released: the change is still refused.
     let mut rig = with_an_open_clutch();
     rig.request(Request::Clutch {
         hold: ClutchMode::Released,
@@ -133,6 +134,7 @@ fn placement_during_contact_is_refused() {
     assert_eq!(rig.latest().mode, Mode::Armed);
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_hold_ends_with_the_session_of_its_host() {
     let closed = |rig: &mut Rig| {

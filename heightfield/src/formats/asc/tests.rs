@@ -27,11 +27,11 @@ fn header_accepts_any_white_space_case_and_order() {
 }
 
 #[test]
-fn numbers_as_they_are_written() {
+fn numbers_are_read_in_each_notation() {
     let text = "ncols 2\nnrows 3\ncellsize 1\n+1.5 1e3\n1,25 -.5\nNaN -9999";
     let found = heights(text);
     assert_eq!(found[..4], [1.5, 1000.0, 1.25, -0.5]);
-    assert!(found[4].is_nan(), "not a number is a hole");
+    assert!(found[4].is_nan(), "not a number is no-data");
     assert!(
         found[5].is_nan(),
         "-9999 is Esri's no-data where none is stated"
@@ -39,7 +39,7 @@ fn numbers_as_they_are_written() {
 }
 
 #[test]
-fn samples_take_the_narrowest_type_that_holds_them() {
+fn samples_use_the_narrowest_exact_type() {
     let typed = |values: &str| {
         let text = format!("ncols 2\nnrows 2\ncellsize 1\nnodata_value -32768\n{values}");
         open(&text)

@@ -22,8 +22,8 @@ pub(super) fn read<R: Read>(
     // The cell size is checked first: the error of a wrong header explains more than that of a
     // wrong sample.
     header.cell()?;
-    let promised = u64::from(columns) * u64::from(rows);
-    let possible = promised.min(file_bytes / 2 + 1);
+    let stated = u64::from(columns) * u64::from(rows);
+    let possible = stated.min(file_bytes / 2 + 1);
     let mut growing = Growing::new(usize::try_from(possible).unwrap_or(0));
     let mut count = 0;
     while let Some(word) = tokens.next()? {
@@ -34,7 +34,7 @@ pub(super) fn read<R: Read>(
                 count % u64::from(columns)
             )
         };
-        if count == promised {
+        if count == stated {
             return Err(RasterError::damaged(format!(
                 "more numbers than the {columns} × {rows} of its header: '{word}' follows the last"
             )));
@@ -47,9 +47,9 @@ pub(super) fn read<R: Read>(
         growing.push(value);
         count += 1;
     }
-    if count < promised {
+    if count < stated {
         return Err(RasterError::Truncated(format!(
-            "its header promises {columns} × {rows} = {promised} numbers, {count} follow"
+            "its header states {columns} × {rows} = {stated} numbers, {count} follow"
         )));
     }
     Ok(growing.samples)

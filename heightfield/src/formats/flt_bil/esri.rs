@@ -28,7 +28,7 @@ pub(super) fn read(text: &str, extension: &str, bytes: u64) -> Result<Header, Ra
     let (columns, rows) = (keys.count("ncols")?, keys.count("nrows")?);
     let (columns, rows) = match (columns, rows) {
         (Some(columns), Some(rows)) if columns > 0 && rows > 0 => (columns, rows),
-        _ => return Err(RasterError::damaged("it gives no columns or no rows")),
+        _ => return Err(RasterError::damaged("it states no columns or no rows")),
     };
     let interleave = match keys.text("layout").or(match extension {
         "bip" => Some("bip"),
@@ -232,6 +232,6 @@ fn number_type(name: &str) -> Result<(u32, char), RasterError> {
         .parse::<u32>()
         .ok()
         .and_then(|bytes| bytes.checked_mul(8));
-    let unknown = || RasterError::damaged(format!("numbertype {name} is not known"));
+    let unknown = || RasterError::damaged(format!("numbertype {name} is not supported"));
     bits.zip(kind).ok_or_else(unknown)
 }

@@ -43,7 +43,7 @@ struct Steps {
 }
 
 impl Layout {
-    /// Checks that the file holds the samples that the header `header` states.
+    /// Checks that the file contains the samples that the header `header` states.
     pub(super) fn check(&self, band: u32, bytes: u64, header: &str) -> Result<(), RasterError> {
         if band > self.bands {
             let available = match self.bands {
@@ -59,12 +59,12 @@ impl Layout {
         let (columns, rows) = (self.columns, self.rows);
         let end = self.end(band).ok_or_else(|| {
             RasterError::AbsurdSize(format!(
-                "{header} beside it promises {columns} × {rows} samples"
+                "{header} beside it states {columns} × {rows} samples"
             ))
         })?;
         if end > bytes {
             return Err(RasterError::Truncated(format!(
-                "{header} beside it promises {columns} × {rows} samples of {} bytes, which end at \
+                "{header} beside it states {columns} × {rows} samples of {} bytes, which end at \
                  byte {end}; the file has {bytes}",
                 self.stored.bytes()
             )));
@@ -78,11 +78,11 @@ impl Layout {
         let (columns, rows, bands) = (self.columns, self.rows, self.bands);
         let row = u64::from(columns).saturating_mul(self.stored.bytes());
         let end = self.end(bands).unwrap_or(u64::MAX);
-        // Padding of rows or bands follows the last one, too.
+        // Padding of rows or bands also follows the last one.
         let padding = self.row_bytes.unwrap_or(0).saturating_add(self.band_gap);
         if bytes > end && bytes - end >= row.max(padding) {
             return Err(RasterError::damaged(format!(
-                "{header} beside it promises {columns} × {rows} samples of {} bytes in {bands} \
+                "{header} beside it states {columns} × {rows} samples of {} bytes in {bands} \
                  bands, which end at byte {end}; the file has {bytes}: correct the type or size \
                  in the header",
                 self.stored.bytes()

@@ -86,7 +86,7 @@ pub(crate) fn decode_by_header(
     (header.describe)(&mut decoded).map_err(|fault| in_header(fault, &name))?;
     if header.layout.bands > 1 && options.band.is_none() {
         decoded.remarks.push(format!(
-            "it has {} bands: the first is taken for the height (--input band=N)",
+            "it has {} bands: the first is used as the height (--input band=N)",
             header.layout.bands
         ));
     }

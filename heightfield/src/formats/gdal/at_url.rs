@@ -135,7 +135,7 @@ pub(super) fn download(
     for (bytes, name) in [(input, name.clone())].into_iter().chain(notes) {
         let mut file = File::create(folder.path().join(name)).map_err(RasterError::Unreadable)?;
         copy(&mut bytes.reader()?, &mut file)
-            .map_err(|error| RasterError::from_io(error, "what is at the URL"))?;
+            .map_err(|error| RasterError::from_io(error, "the content of the URL"))?;
     }
     Ok((folder, name))
 }

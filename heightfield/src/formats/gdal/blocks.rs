@@ -139,7 +139,8 @@ impl GdalBlocks {
             Some(coarser) => {
                 let overviews = full.overviews();
                 let overview = (self.overviews.get(coarser)).and_then(|at| overviews.get(*at));
-                *overview.ok_or_else(|| RasterError::damaged("GDAL: an overview has gone"))?
+                *overview
+                    .ok_or_else(|| RasterError::damaged("GDAL: an overview has disappeared"))?
             }
         };
         let samples = match self.has_codes {

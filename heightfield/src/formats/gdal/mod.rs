@@ -44,7 +44,7 @@ const HEAD_BYTES: u64 = 1024;
 /// Number of bands of a colour picture, of bytes.
 const COLOURS: std::ops::RangeInclusive<u32> = 3..=4;
 /// Parts of GDAL's messages about a file without a driver.
-const UNKNOWN: [&str; 2] = ["not recognized as", "no driver knows"];
+const UNKNOWN: [&str; 2] = ["not recognized as", "no driver supports"];
 
 /// Reads a file, folder or other source that a driver opens.
 ///
@@ -209,7 +209,7 @@ fn no_raster(who: &str) -> RasterError {
     RasterError::ByGdal(Error::Refused(format!("{who} finds no raster in it")))
 }
 
-/// Returns the name of the chosen raster, if the file holds several.
+/// Returns the name of the chosen raster, if the file contains several.
 fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, RasterError> {
     // `depth` for `NETCDF:"ocean.nc":depth`.
     let short = |name: &str| {
@@ -231,7 +231,7 @@ fn chosen(dataset: &Dataset, options: &OpenOptions) -> Result<Option<String>, Ra
         return Err(match requested {
             Some(requested) => RasterError::NoSuchPart {
                 requested: format!("variable {requested}"),
-                available: "the file holds one raster".into(),
+                available: "the file contains one raster".into(),
             },
             None => no_raster(&format!("its driver {}", dataset.driver())),
         });
@@ -300,7 +300,7 @@ fn decoded(
     decoded.offset = offset.unwrap_or(0.0);
     if bands > 1 && options.band.is_none() && !has_codes {
         decoded.remarks.push(format!(
-            "it has {bands} bands: the first is taken for the height (--input band=N)"
+            "it has {bands} bands: the first is used as the height (--input band=N)"
         ));
     }
     if COMBINING_DRIVERS.contains(&driver.as_str()) && no_data.is_none() {

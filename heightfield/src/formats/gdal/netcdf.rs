@@ -87,7 +87,7 @@ impl Conventions {
         match self.positive.as_str() {
             "down" => decoded.turn_depths_into_heights("positive is down"),
             "up" if is_depth => decoded.remarks.push(format!(
-                "its standard_name {} is a depth, and its attribute positive says up: heights are \
+                "its standard_name {} is a depth, and its attribute positive is up: heights are \
                  rendered as they are",
                 self.name
             )),
@@ -105,7 +105,7 @@ impl Conventions {
             .collect();
         if !heights.is_empty() {
             decoded.remarks.push(format!(
-                "its missing_value {} is read as a height: GDAL knows one no-data value (--input no-data=VALUE)",
+                "its missing_value {} is read as a height: GDAL supports one no-data value (--input no-data=VALUE)",
                 heights.join(", ")
             ));
         }

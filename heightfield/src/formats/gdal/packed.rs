@@ -151,7 +151,7 @@ fn only(
     match rasters.len() {
         1 => Ok(rasters.remove(0)),
         0 => Err(RasterError::NotAHeightField(
-            "the archive holds no terrain file".into(),
+            "the archive contains no terrain file".into(),
         )),
         _ => Err(RasterError::SeveralHeights {
             kind: "file",

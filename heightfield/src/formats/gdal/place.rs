@@ -89,7 +89,7 @@ impl Place {
         self.served.is_some()
     }
 
-    /// Removes the file's folder from GDAL's message: the user named it, or does not know it.
+    /// Removes the file's folder from GDAL's message: the user named it, or it is a temporary one.
     pub(super) fn in_words(&self, refusal: RasterError) -> RasterError {
         let folder = self
             .path

@@ -18,7 +18,7 @@ use crate::{OpenOptions, RasterError, file_name};
 const MAX_BYTES: u64 = 4 << 20;
 /// Max difference of the places of a file and its item, in cells.
 const TOLERANCE: f64 = 0.05;
-/// Media types of files that may hold heights.
+/// Media types of files that may contain heights.
 const MEDIA: [&str; 3] = ["tif", "jp2", "netcdf"];
 
 /// An item, with those of its assets that may be heights.
@@ -72,7 +72,7 @@ pub(super) fn check_places(
         let is_at_its_place = dataset.is_ok_and(|dataset| item.is_place_of(&dataset));
         if !(is_found && is_at_its_place) {
             let why = format!(
-                "the item {} does not lie where its file {file} does",
+                "the place of the item {} differs from that of its file {file}",
                 item.id
             );
             return Err(to_build(&why, &items)?);

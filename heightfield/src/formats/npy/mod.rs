@@ -172,6 +172,7 @@ mod tests {
         assert!(matches!(fault, RasterError::NotAHeightField(_)), "{fault}");
     }
 
+    /// Safety: 29.
     #[test]
     fn header_that_nests_deep_is_refused_at_once() {
         for deep in ["{".repeat(30), "{\"}\":".repeat(30)] {

@@ -177,7 +177,7 @@ mod tests {
                     |column, row| encoded(ground(column, row), encoding),
                     with_alpha,
                 );
-                let fault = open(&tile, None).expect_err("not without being told");
+                let fault = open(&tile, None).expect_err("not without the option");
                 assert!(
                     matches!(fault, RasterError::EncodedPicture(found) if found == encoding),
                     "{encoding:?}: {fault}"

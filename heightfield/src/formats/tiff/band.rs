@@ -40,9 +40,7 @@ impl<'f> Band<'f> {
         let samples = columns * rows;
         let mut values = Vec::new();
         values.try_reserve_exact(samples).map_err(|_| {
-            RasterError::AbsurdSize(format!(
-                "{samples} samples are more than this machine can hold"
-            ))
+            RasterError::AbsurdSize(format!("{samples} samples do not fit into memory"))
         })?;
         let rows_at_once = height.clamp(1, part.rows.max(1)) as usize;
         for first in (row..row + rows).step_by(rows_at_once) {

@@ -1,4 +1,4 @@
-//! Check that a file can hold the samples in its header, before memory is allocated.
+//! Check that a file can contain the samples in its header, before memory is allocated.
 
 use super::layout::Layout;
 use super::unpack;
@@ -53,7 +53,7 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
         });
     }
     if inside == 0 {
-        let what = "the samples are said to lie behind its end".into();
+        let what = "its index places the samples behind its end".into();
         return Err(RasterError::Truncated(what));
     }
     // These cannot overflow: columns and rows are below 2^32, and a texel has at most 2^19 bytes.
@@ -63,7 +63,7 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
     let promised = stored.saturating_mul(ratio);
     let in_file = u128::from(file_bytes) * ratio;
     if u128::from(layout.chunk.0) * texel > in_file {
-        return Err(absurd("in rows longer than the file could hold"));
+        return Err(absurd("in rows longer than the file"));
     }
     let chunk = u128::from(layout.chunk.0) * u128::from(layout.chunk.1) * texel;
     let omitted = u128::from(missing) * chunk;
@@ -73,7 +73,7 @@ pub(super) fn check(layout: &Layout, file_bytes: u64, stays: bool) -> Result<(),
         false => omitted.min(room.max(u128::from(SPARSE_FLOOR))),
     };
     if image > promised.saturating_add(no_data_bytes) {
-        return Err(absurd("are more than the bytes in its index can hold"));
+        return Err(absurd("are more than the bytes in its index can contain"));
     }
     if image > in_file.saturating_add(no_data_bytes) {
         return Err(RasterError::Truncated(format!(

@@ -72,7 +72,7 @@ pub(super) fn number_kind(options: &OpenOptions) -> Result<NumberKind, RasterErr
     }
 }
 
-/// Adds a remark on the tag for the position of the first row and column, which GDAL ignores, too.
+/// Adds a remark on the tag for the position of the first row and column, which GDAL also ignores.
 fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
     const ORIENTATION: u16 = 274;
     let first = match image.tag(ORIENTATION).and_then(|tag| tag.value.as_u32()) {
@@ -83,6 +83,6 @@ fn remark_orientation(image: &Ifd, decoded: &mut Decoded) {
         Some(_) => "rows and columns exchanged",
     };
     decoded.remarks.push(format!(
-        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is taken to be the northern one unless the file's place says otherwise"
+        "its Orientation tag has {first}: it is not used, as in GDAL, and the first row is read as the northern one unless the file's place states another"
     ));
 }

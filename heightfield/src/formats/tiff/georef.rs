@@ -103,7 +103,7 @@ fn reference_system(keys: &GeoKeys, by_gdal: Option<&FileBytes>) -> Option<Refer
         true => PROJ_CITATION,
         false => GEOG_CITATION,
     });
-    let unknown = code.map(|code| format!("EPSG:{code}, not known here"));
+    let unknown = code.map(|code| format!("EPSG:{code}, not supported"));
     let name = unknown.as_deref().or(own_name).or(keys.text(GT_CITATION));
     Some(user_defined::system(keys, is_projected, name, by_gdal))
 }

@@ -155,7 +155,7 @@ impl Layout {
             ));
         }
         if Index::of(image, tiled).is_none() {
-            let what = "TIFF: it does not say where its samples are";
+            let what = "TIFF: it does not state where its samples are";
             return Err(RasterError::damaged(what));
         }
         let layout = Self {

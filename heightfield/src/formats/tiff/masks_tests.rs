@@ -1,4 +1,4 @@
-//! Masks of few bits per sample, in strips and tiles, read in every way.
+//! Masks of few bits per sample, in strips and tiles, by each reader.
 
 use std::io::Write;
 

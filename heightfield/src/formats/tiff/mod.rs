@@ -116,7 +116,7 @@ fn decode(input: &FileBytes, options: &OpenOptions) -> Result<Decoded, RasterErr
     }
     if options.band.is_none() && options.encoding.is_none() && bands > 1 + u16::from(has_alpha) {
         decoded.remarks.push(format!(
-            "it has {bands} bands: the first is taken for the height (--input band=N)"
+            "it has {bands} bands: the first is used as the height (--input band=N)"
         ));
     }
     decoded.file_layout = file_layout;
@@ -214,7 +214,7 @@ fn peak_memory_remark(layout: &Layout) -> &'static str {
     let all = Part::whole(layout.columns, layout.rows);
     match layout.is_plain || unpack::suits_whole_band(layout, &all) {
         true => "",
-        false => "; while it is opened it takes more than that",
+        false => "; opening it requires more than that",
     }
 }
 

@@ -72,7 +72,8 @@ pub(super) fn bytes(
     chunk: &Chunk,
     range: Range<u64>,
 ) -> Result<Vec<u8>, RasterError> {
-    let too_long = || RasterError::AbsurdSize("TIFF: a row of more bytes than memory holds".into());
+    let too_long =
+        || RasterError::AbsurdSize("TIFF: a row of more bytes than fit in memory".into());
     let count = usize::try_from(range.end - range.start).map_err(|_| too_long())?;
     if chunk.bytes == 0 {
         return Ok(vec![0; count]);
@@ -82,7 +83,7 @@ pub(super) fn bytes(
     }
     if range.end > chunk.bytes {
         return Err(RasterError::damaged(
-            "TIFF: a strip or tile of fewer bytes than its samples take",
+            "TIFF: a strip or tile of fewer bytes than its samples",
         ));
     }
     let source = layout.directory.file().source();

@@ -128,7 +128,7 @@ impl Unpacked {
         let mut bytes = vec![0; (range.end - range.start) as usize];
         let place = self.slot_bytes * index as u64 + range.start;
         let read = read_exact_at(&self.unnamed.file, &mut bytes, place);
-        let read = read.map_err(|error| RasterError::from_io(error, "what was unpacked"));
+        let read = read.map_err(|error| RasterError::from_io(error, "the unpacked samples"));
         Some(read.map(|()| bytes))
     }
 

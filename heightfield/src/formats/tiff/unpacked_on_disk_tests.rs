@@ -151,7 +151,7 @@ fn two_tile_rows_stay_unpacked_at_any_limit_and_more_within_it() {
         check_parts(&TILES, &layout);
         let unpacked = layout.unpacked.as_ref().expect("unpacked");
         assert_eq!(unpacked.max_bytes(), max_tiles * tile);
-        let file = unpacked.unnamed.file.metadata().expect("told");
+        let file = unpacked.unnamed.file.metadata().expect("metadata");
         assert!(file.len() <= max_tiles * tile, "{} {max_bytes}", file.len());
     }
 }
@@ -274,6 +274,6 @@ fn unpacking_by_rows_refuses_lerc() {
     let mut layout = Layout::read(&full, NumberKind::Heights(None)).expect("a layout");
     let folder = tempfile::tempdir().expect("a folder");
     let disk = DiskCache::at(folder.path(), 1);
-    let error = unpack::into_file(&mut layout, &disk).expect_err("it comes as a whole");
+    let error = unpack::into_file(&mut layout, &disk).expect_err("it is unpacked as a whole");
     assert!(error.to_string().contains("lerc"), "{error}");
 }

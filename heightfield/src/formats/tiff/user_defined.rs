@@ -1,5 +1,5 @@
 //! Reference systems without a code, defined by a GeoTIFF's keys: read by libgdal, if it is
-//! installed; otherwise only name, unit and ellipsoid are known.
+//! installed; otherwise only name, unit and ellipsoid are read.
 
 use geotiff_core::geokeys::{GEODETIC_CRS_TYPE, GEOG_CITATION};
 

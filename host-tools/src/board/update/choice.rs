@@ -82,6 +82,7 @@ mod tests {
         }
     }
 
+    /// Safety: 34.
     #[test]
     fn choice_among_several_devices_needs_a_unique_serial() {
         let [a, b, c] = [

@@ -27,7 +27,7 @@ pub enum UpdateError {
     #[error("the board has left its program, and no loader has appeared on USB")]
     NoLoader,
     /// The loader describes its flash in an unsupported way.
-    #[error("the loader describes its flash in a way that is not understood: {0:?}")]
+    #[error("the loader's description of its flash is not understood: {0:?}")]
     Layout(String),
     /// The loader's flash differs from the board's chip.
     #[error("the loader is not that of {board}: it reports the flash {description:?}")]
@@ -50,7 +50,7 @@ pub enum UpdateError {
     #[error("the image has no vectors at {0:#010x}")]
     NoVectors(u64),
     /// The loader was disconnected or does not respond.
-    #[error("the loader is gone, while it was to {operation}")]
+    #[error("the loader disconnected during the request to {operation}")]
     Disconnected {
         /// Step that failed.
         operation: &'static str,

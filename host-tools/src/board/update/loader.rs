@@ -99,18 +99,18 @@ impl<P: ControlPipe> Loader<P> {
             [_, FUNCTIONAL, attributes, _, _, low, high, ..] => {
                 (*attributes, u16::from_le_bytes([*low, *high]))
             }
-            _ => return Err(UpdateError::Cannot("say what it can")),
+            _ => return Err(UpdateError::Cannot("report its capabilities")),
         };
         if attributes & CAN_DOWNLOAD == 0 {
             return Err(UpdateError::Cannot("write"));
         }
         if attributes & CAN_UPLOAD == 0 {
-            return Err(UpdateError::Cannot("read back what was written"));
+            return Err(UpdateError::Cannot("read back the written bytes"));
         }
         // A transfer contains only whole words of flash.
         let transfer = transfer.min(MAX_TRANSFER_BYTES) / 32 * 32;
         if transfer == 0 {
-            return Err(UpdateError::Cannot("take whole words of flash"));
+            return Err(UpdateError::Cannot("accept whole words of flash"));
         }
         let mut loader = Self {
             pipe,
@@ -169,7 +169,7 @@ impl<P: ControlPipe> Loader<P> {
             let got = self.pipe.read(request::UPLOAD, block, length);
             let got = got.map_err(|source| self.failure(OPERATION, source))?;
             if got.len() != usize::from(length) {
-                return Err(UpdateError::Cannot("read back what was written"));
+                return Err(UpdateError::Cannot("read back the written bytes"));
             }
             all.extend(got);
             block = block.wrapping_add(1);
@@ -265,7 +265,7 @@ impl<P: ControlPipe> Loader<P> {
         let answer = self.pipe.read(request::GETSTATUS, 0, 6);
         let answer = answer.map_err(|source| UpdateError::Disconnected { operation, source })?;
         let [status, low, middle, high, state, _] = answer[..] else {
-            return Err(UpdateError::Cannot("say how it is"));
+            return Err(UpdateError::Cannot("report its status"));
         };
         let ms = u32::from_le_bytes([low, middle, high, 0]);
         Ok(Status {
@@ -288,14 +288,14 @@ fn refusal(operation: &'static str, Status { status, state, .. }: Status) -> Upd
 /// Returns the meaning of a status (DFU 1.1, 6.1.2; ST redefines some).
 const fn meaning(status: u8) -> &'static str {
     match status {
-        0x00 => "it is in another state than it should be",
-        0x01 => "the address is not one that it can write",
+        0x00 => "it is not in the expected state",
+        0x01 => "it cannot write this address",
         0x02 => "the bytes are not for this device",
         0x03 => "its flash cannot be written",
         0x04 => "its flash cannot be erased",
         0x08 => "the address is out of its range",
         0x0B => "its flash is protected against reading",
         0x0F => "it did not expect that request",
-        _ => "it does not know why",
+        _ => "it does not report the reason",
     }
 }

@@ -177,6 +177,7 @@ mod tests {
         }
     }
 
+    /// Safety: 36.
     #[test]
     fn calibration_sectors_cannot_be_erased() {
         let calibrations = FLASH + 508 * 1024;

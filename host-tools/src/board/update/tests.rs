@@ -177,6 +177,7 @@ fn update_succeeds_with_loader_left_mid_transfer_or_in_error() {
     }
 }
 
+/// Safety: 36.
 #[test]
 fn lost_loader_leaves_no_half_program_and_can_be_retried() {
     for rom in ROMS {
@@ -218,6 +219,7 @@ fn check_disconnect(rom: &'static Rom, image: &Image, disconnected_after: usize,
     assert!(done.is_ok() && is_whole(&device, image), "{at}: again");
 }
 
+/// Safety: 36.
 #[test]
 fn image_that_fails_verification_is_not_started() {
     for rom in ROMS {
@@ -281,6 +283,7 @@ fn assert_untouched(device: &Scripted) {
     assert!(device.flash.iter().all(|byte| *byte == 0xA5));
 }
 
+/// Safety: 36.
 #[test]
 fn foreign_loader_or_image_is_refused_before_erasing() {
     for (rom, other) in [(&G474, &H743), (&H743, &G474)] {

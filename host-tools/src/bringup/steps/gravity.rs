@@ -98,6 +98,6 @@ pub(super) fn check(
     board.expect_fault(attendant, Task::ReleaseDeadMan, Fault::DeadManReleased)?;
     board.disarm_and_clear()?;
     Ok(format!(
-        "the tip stayed within {drift_mm:.1} mm for 3 s; letting the switch go gave fault 6"
+        "the tip stayed within {drift_mm:.1} mm for 3 s; releasing the switch caused fault 6"
     ))
 }

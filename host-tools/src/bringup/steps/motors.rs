@@ -36,7 +36,7 @@ pub(super) fn check(
     let found = find_torque(board, attendant, &record, axis)?;
     let nominal = f64::from(record.torque_constant[axis]);
     Ok(format!(
-        "turns joint {} the right way ({sign:+} in the record); {found:.4} Nm/A by the scale, {nominal:.4} in the record",
+        "turns joint {} in the right direction ({sign:+} in the record); {found:.4} Nm/A by the scale, {nominal:.4} in the record",
         axis + 1
     ))
 }

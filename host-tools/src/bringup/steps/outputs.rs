@@ -64,7 +64,7 @@ pub(super) fn check(
         }
     }
     board.request(&Request::HoldOutputs(None))?;
-    Ok("each output follows, at the middle and at half of full scale either way".into())
+    Ok("each output follows, at the middle and at half of full scale in both directions".into())
 }
 
 #[cfg(test)]

@@ -72,7 +72,7 @@ pub(super) fn check(
         return Err(Finding::NoFloor.into());
     }
     Ok(format!(
-        "{depth_mm:.1} mm deep the floor pushed up with {up_n:.2} N; the emergency stop gave fault 5"
+        "{depth_mm:.1} mm deep the floor pushed up with {up_n:.2} N; the emergency stop caused fault 5"
     ))
 }
 

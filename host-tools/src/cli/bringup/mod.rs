@@ -28,14 +28,14 @@ const VIRTUAL_TIMEOUT: Duration = Duration::from_secs(20);
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Device: usb, tcp:HOST:PORT, or native (the application in this program, with a
-    /// virtual arm and a virtual user who shows how it goes)
+    /// virtual arm and a virtual user who does each step)
     #[arg(long, default_value = "usb")]
     pub device: DeviceAddress,
 
     /// Keep the log in this file [default: a file for the board in your data folder;
     /// none for native]
-    #[arg(long, value_name = "FILE.toml", value_hint = ValueHint::FilePath)]
-    pub log: Option<PathBuf>,
+    #[arg(short, long, value_name = "FILE.toml", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
 
     /// Begin again with this step, as motor-2
     #[arg(long, value_name = "STEP", value_enum)]
@@ -117,7 +117,7 @@ fn bring_up<A: Attendant>(
 
 /// Returns the path of the log.
 fn log_path(args: &Args, control: &ControlSession<'_>) -> Result<Option<PathBuf>, Failure> {
-    Ok(match (&args.log, &args.device) {
+    Ok(match (&args.out, &args.device) {
         (Some(path), _) => Some(path.clone()),
         (None, DeviceAddress::Native) => None,
         (None, _) => Some(Log::path_of(control.device())?),
@@ -128,10 +128,10 @@ impl Hint for BringupError {
     fn hint(&self) -> String {
         match self {
             Self::Found { finding, .. } => {
-                format!("{}; then go on with hapterra bringup", finding.remedy())
+                format!("{}; then continue with hapterra bringup", finding.remedy())
             }
             Self::Halt(Halt::Link(error)) => error.hint(),
-            Self::Halt(_) => "go on with hapterra bringup when you are ready".into(),
+            Self::Halt(_) => "continue with hapterra bringup when you are ready".into(),
             Self::Log(error) => error.hint(),
         }
     }
@@ -140,8 +140,8 @@ impl Hint for BringupError {
 impl Hint for LogError {
     fn hint(&self) -> String {
         match self {
-            Self::NoLog { .. } => "name another file with --log, or move this one away".into(),
-            _ => "name a file in a folder that you may write to with --log".into(),
+            Self::NoLog { .. } => "name another file with -o, or move this one away".into(),
+            _ => "name a file in a folder that you may write to with -o".into(),
         }
     }
 }

@@ -82,6 +82,7 @@ mod tests {
         }
     }
 
+    /// Safety: 16.
     #[test]
     fn bring_up_requires_complete_log_of_this_board_and_record() {
         let (device, record) = (device(), Calibration::PREMIUM_1_5);

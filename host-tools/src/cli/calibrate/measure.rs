@@ -43,13 +43,13 @@ impl FromStr for Measure {
             takes_guessed_ratios,
         } = measure;
         if measures_nothing == (zero || ratios || gravity) {
-            return Err("either none, or what is measured, as zero,gravity".into());
+            return Err("either none, or a list of measurements, as zero,gravity".into());
         }
         if (ratios || gravity) && !zero {
             return Err("the zero pose is measured first: add zero".into());
         }
         if ratios && takes_guessed_ratios {
-            return Err("ratios are measured, or guessed-ratios taken as they are".into());
+            return Err("ratios or guessed-ratios, not both".into());
         }
         Ok(measure)
     }

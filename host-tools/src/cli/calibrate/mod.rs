@@ -61,7 +61,7 @@ pub struct Args {
     #[arg(long, value_name = "LIST", default_value = "all")]
     pub measure: Measure,
 
-    /// File for the record, too, as TOML
+    /// Also write the record to this file, as TOML
     #[arg(short, long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
 
@@ -103,7 +103,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     check_distinct(&outputs, &inputs).or_hint(OTHER_FILE)?;
     match &args.show {
         Some(Some(path)) => return put(&file::to_toml(&file::read(path)?)),
-        // A read-only query does not take the arm from its host.
+        // A read-only query leaves the arm to its host.
         Some(None) => {
             return put(&file::to_toml(
                 &args.device.with_read_only_session(device_record)?,
@@ -135,7 +135,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn device_record(control: &mut ControlSession<'_>) -> Result<Calibration, Failure> {
     let held = control
         .calibration()?
-        .ok_or("the device holds no calibration");
+        .ok_or("the device has no calibration");
     held.or_hint("see hapterra status")
 }
 
@@ -149,7 +149,7 @@ fn calibrate(
     let measure = args.measure;
     if !measure.ratios && !measure.takes_guessed_ratios && begin.has_guessed_ratios() {
         return Err("the cable ratios of this model are a guess, and were never measured").or_hint(
-            "measure them, too; or accept guesses: --measure zero,gravity,guessed-ratios",
+            "measure them as well, or accept guesses: --measure zero,gravity,guessed-ratios",
         );
     }
     if control.status()?.health.report.mode.is_driving() {

@@ -32,10 +32,11 @@ impl Attendant for UserAtTerminal {
 
     fn move_along(&mut self, direction: Direction, about_mm: f64) -> Result<f64, Stopped> {
         print_line(format!(
-            "lay a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
+            "place a ruler at the tip, {}; move the tip along it by about {about_mm} mm and hold it",
             direction.words()
         ));
-        let moved = number(&format!("  how far did it go, in mm? [{about_mm}]")).ok_or(Stopped)?;
+        let moved =
+            number(&format!("  how far did it move, in mm? [{about_mm}]")).ok_or(Stopped)?;
         Ok(moved.unwrap_or(about_mm))
     }
 
@@ -43,7 +44,7 @@ impl Attendant for UserAtTerminal {
         if pose == 1 {
             print_line(
                 "gravity: hold the tip by a thread on a spring or kitchen scale, everything still, in poses that differ;\n  \
-                 tell what the scale reads upwards and towards you (negative: down, away from you)",
+                 state the scale's reading upwards and towards you (negative: down, away from you)",
             );
         }
         let grams = |question: String| number(&question).ok_or(Stopped);
@@ -61,7 +62,7 @@ impl Attendant for UserAtTerminal {
         if self.yes {
             return Ok(true);
         }
-        let answer = prompt("take this record? [y/N]").ok_or(Stopped)?;
+        let answer = prompt("accept this record? [y/N]").ok_or(Stopped)?;
         Ok(matches!(answer.as_str(), "y" | "Y" | "yes"))
     }
 }

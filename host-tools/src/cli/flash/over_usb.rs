@@ -145,7 +145,7 @@ fn wait_for_firmware(place: &str) -> Result<(), Failure> {
     let Some(device) = back else {
         return Err(
             Failure::new("the board was updated, and did not reappear on USB")
-                .hint("press its reset button; `hapterra status` shows how it is then"),
+                .hint("press its reset button, then check it with `hapterra status`"),
         );
     };
     let transport = Box::new(Usb::connect(device.serial.as_deref())?);

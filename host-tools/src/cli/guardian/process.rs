@@ -55,7 +55,7 @@ pub(super) fn watch(program: &[OsString], arguments: &[OsString]) -> u8 {
     match Watch::begin(program, arguments) {
         Ok(mut watch) => watch.until_end(),
         Err(error) => {
-            let error = format!("cannot start the process that serves: {error}");
+            let error = format!("cannot start the serving process: {error}");
             Failure::new(error).report();
             1
         }
@@ -198,7 +198,7 @@ impl Watch {
                 true => "the program did not react to Ctrl-C and was killed\n".into(),
                 false => {
                     let name = signal_name(signal).unwrap_or("a signal");
-                    format!("the process that served was ended by {name}\n")
+                    format!("the serving process was ended by {name}\n")
                 }
             });
         }
@@ -225,7 +225,7 @@ impl Watch {
             if let Ok(file) = fs::metadata(path) {
                 let (path, bytes) = (path.display(), file.len());
                 interrupt::print_line(format!(
-                    "recording      {path} ({bytes} bytes) is what was written of it (its last line may be cut); it stays until you delete it\n"
+                    "recording      {path} ({bytes} bytes) is incomplete (its last line may be cut); it stays until you delete it\n"
                 ));
             }
         }

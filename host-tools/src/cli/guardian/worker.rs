@@ -18,7 +18,7 @@ pub(super) fn begin() -> bool {
     });
     if let Err(error) = listening {
         // The guardian still detects the end of this process, and sends signals on.
-        eprintln!("warning: the guardian does not know which arm may be armed: {error}");
+        eprintln!("warning: the guardian cannot be notified of an arm that may be armed: {error}");
     }
     true
 }

@@ -21,7 +21,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
     let hint = match fault {
         RasterError::UnknownFormat => {
             return format!(
-                "{}{}; or say how raw samples lie with --input raw=WxH:i16:le",
+                "{}{}; or state the layout of raw samples with --input raw=WxH:i16:le",
                 with_gdal(path),
                 conversion_command(path, "")
             );
@@ -65,7 +65,7 @@ fn hint(path: &Path, fault: &RasterError) -> String {
             "name a folder with terrain files, or a pattern in quotes, as 'tiles/*.tif' or 'tiles/**/*.tif'"
         }
         RasterError::AmbiguousAssets { names, .. } if names.is_empty() => {
-            "take a STAC whose items have assets with heights"
+            "choose a STAC whose items have assets with heights"
         }
         RasterError::AmbiguousAssets { names, .. } => {
             return format!(
@@ -77,14 +77,14 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::NotAHeightField(_) => {
             let one_band = format!("-b 1 {PLAIN}");
             return format!(
-                "take a file with heights; or {}",
+                "choose a file with heights; or {}",
                 conversion_command(path, &one_band)
             );
         }
-        RasterError::NoNumbers(_) => "take a file with heights",
+        RasterError::NoNumbers(_) => "choose a file with heights",
         RasterError::ColourBands { bands, .. } => {
             return format!(
-                "if one of its bands holds heights, name it: --input band=1 to {bands}; if its colours encode heights: --input encoding=terrain-rgb or terrarium"
+                "if one of its bands contains heights, name it: --input band=1 to {bands}; if its colours encode heights: --input encoding=terrain-rgb or terrarium"
             );
         }
         RasterError::SeveralHeights { names, .. } => {
@@ -100,12 +100,12 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::EncodedPicture(encoding) => {
             let name = encoding.name();
             return format!(
-                "if its colours are heights, say so: --input encoding={name} (with --input cell=30m for its scale)"
+                "if its colours are heights, state the encoding: --input encoding={name} (with --input cell=30m for its scale)"
             );
         }
         RasterError::HeaderMissing(name) => {
             return format!(
-                "put {name} beside it; or say how the samples lie: --input raw=WxH:f32"
+                "put {name} beside it; or state the sample layout: --input raw=WxH:f32"
             );
         }
         RasterError::TooLarge { columns, rows, .. } => {
@@ -129,9 +129,9 @@ fn hint(path: &Path, fault: &RasterError) -> String {
         RasterError::Remote(error) => remote_hint(path, error),
         RasterError::RawSizeMissing => "state the sample layout: --input raw=WxH:i16:le",
         RasterError::AmbiguousChannels(_) => {
-            "state which channel holds the height: --input channel=red|green|blue|alpha|grey"
+            "state which channel contains the height: --input channel=red|green|blue|alpha|grey"
         }
-        RasterError::TooSmall { .. } => "take a larger part of the terrain",
+        RasterError::TooSmall { .. } => "choose a larger part of the terrain",
         RasterError::AllNoData { .. } => {
             "check that the file covers your area, or name another no-data value with --input no-data=VALUE"
         }
@@ -158,19 +158,19 @@ fn remote_hint(path: &Path, error: &std::io::Error) -> &'static str {
     let scheme = url.split_once("://").map(|(scheme, _)| scheme);
     let [key, server] = match scheme {
         Some("s3" | "s3a") => [
-            "set what the server wants: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a public bucket; AWS_REGION; AWS_ENDPOINT_URL where it is not Amazon's (and AWS_ALLOW_HTTP=true for http)",
+            "set the server's variables: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_SKIP_SIGNATURE=true for a public bucket; AWS_REGION; AWS_ENDPOINT_URL where it is not Amazon's (and AWS_ALLOW_HTTP=true for http)",
             "check the network, and AWS_ENDPOINT_URL where the server is not Amazon's; and try again",
         ],
         Some("gs") => [
-            "set what the server wants: GOOGLE_APPLICATION_CREDENTIALS to the key file of an account that may read it, or GOOGLE_SKIP_SIGNATURE=true for a public bucket; GOOGLE_BASE_URL where it is not Google's",
+            "set the server's variables: GOOGLE_APPLICATION_CREDENTIALS to the key file of an account that may read it, or GOOGLE_SKIP_SIGNATURE=true for a public bucket; GOOGLE_BASE_URL where it is not Google's",
             "check the network, and GOOGLE_BASE_URL where the server is not Google's; and try again",
         ],
         Some("az" | "azure" | "abfs" | "abfss" | "adl") => [
-            "set what the server wants: AZURE_STORAGE_ACCOUNT_NAME; AZURE_STORAGE_ACCOUNT_KEY, AZURE_STORAGE_SAS_TOKEN, or AZURE_SKIP_SIGNATURE=true for a public container; AZURE_STORAGE_ENDPOINT where it is not Microsoft's (and AZURE_ALLOW_HTTP=true for http)",
+            "set the server's variables: AZURE_STORAGE_ACCOUNT_NAME; AZURE_STORAGE_ACCOUNT_KEY, AZURE_STORAGE_SAS_TOKEN, or AZURE_SKIP_SIGNATURE=true for a public container; AZURE_STORAGE_ENDPOINT where it is not Microsoft's (and AZURE_ALLOW_HTTP=true for http)",
             "check the network, AZURE_STORAGE_ACCOUNT_NAME, and AZURE_STORAGE_ENDPOINT where the server is not Microsoft's; and try again",
         ],
         _ => [
-            "check the URL; a key goes behind it, as ?KEY=VALUE",
+            "check the URL; append a key as ?KEY=VALUE",
             "check the URL and the line, and try again",
         ],
     };
@@ -232,11 +232,11 @@ fn conversion_command(path: &Path, options: &str) -> String {
             format!("store one array of two dimensions: python3 -c \"{FROM_NPZ}\" {from}")
         }
         "las" | "laz" => format!(
-            "points are no grid: pip install laspy[lazrs] pyproj, and lay one over them, the last number is a cell's side in their unit: python3 -c \"{FROM_POINTS}\" {from} {} 1",
+            "points are no grid: pip install laspy[lazrs] pyproj, and average them in cells, the last number is a cell's side in their unit: python3 -c \"{FROM_POINTS}\" {from} {} 1",
             quoted(&stem(path))
         ),
         "zip" => format!("unpack it and name one of its files: python3 -m zipfile -e {from} ."),
-        "gz" => format!("unpack it and name what comes out: gzip -dk {from}"),
+        "gz" => format!("unpack it and name the result: gzip -dk {from}"),
         "tar" | "tgz" => format!("unpack it and name one of its files: tar -xf {from}"),
         _ => format!("convert it to GeoTIFF: gdal_translate{space}{options} {from} {to}"),
     }
@@ -257,7 +257,7 @@ fn vrt_command(path: &Path, files: &[String]) -> String {
     };
     let to = quoted(&format!("{}.vrt", stem(path)));
     format!(
-        "make one terrain of its files, each where it says itself: gdalbuildvrt -vrtnodata -32768 {to} {}{more}; and name {to}",
+        "combine its files into one terrain, each at its own position: gdalbuildvrt -vrtnodata -32768 {to} {}{more}; and name {to}",
         each.join(" ")
     )
 }
@@ -280,16 +280,16 @@ fn resampling_command(path: &Path, file: &Path, other: &Path) -> String {
     if path.is_dir() {
         let files = format!("{}/*.{}", quoted(&name), extension(file));
         return format!(
-            "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or lay all of them onto one grid: {ONTO_ONE} {files} one.tif"
+            "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or resample all of them to one grid: {ONTO_ONE} {files} one.tif"
         );
     }
     if !name.contains(['*', '?', '[']) || is_url(&name) {
         let files = [other, file].map(|file| shell_names(file).0).join(" ");
-        return format!("lay them onto one grid: {ONTO_ONE} {files} one.tif");
+        return format!("resample them to one grid: {ONTO_ONE} {files} one.tif");
     }
     let files = name.replace(' ', "\\ ");
     format!(
-        "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or lay all of them onto one grid: \
+        "leave it out with a pattern of names in quotes, as 'tiles/*.tif'; or resample all of them to one grid: \
          {ONTO_ONE} {files} one.tif"
     )
 }

@@ -19,7 +19,7 @@ pub(super) fn source_text(from: &str) -> &'static str {
     match from {
         "file" => "stated",
         "code" => "by the code of its reference system",
-        "option" => "as you say",
+        "option" => "by an option",
         _ => "assumed",
     }
 }
@@ -70,7 +70,7 @@ impl Globe {
                 None,
                 None,
                 format!(
-                    "of its own datum, {name}, from Greenwich; its way to WGS 84 is not known here"
+                    "of its own datum, {name}, from Greenwich; its conversion to WGS 84 is not supported"
                 ),
             ),
             LonLat::OfBody { name, radius_m } => (

@@ -128,7 +128,7 @@ impl Device {
         self.with_opened(open_session, run)
     }
 
-    /// Queries the device without taking it from its host.
+    /// Queries the device; a session of another host continues.
     ///
     /// # Errors
     /// As [`Device::with_session`].

@@ -12,7 +12,7 @@ use crate::events::{Server, Watcher};
 pub struct EventOptions {
     /// Send events as lines of JSON at this port of 127.0.0.1
     ///
-    /// 0 takes a free one. With PORT,N every N-th sample is sent, too, of the thousand that a device reports a second.
+    /// 0 takes a free one. With PORT,N every N-th of the 1,000 samples a second is also sent.
     #[arg(long, value_name = "PORT[,N]", value_parser = events)]
     pub events: Option<Events>,
 }

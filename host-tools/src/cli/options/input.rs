@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use super::quantity::{GROUND, MEMORY};
 use crate::cli::failure::{Failure, OrHint};
+use crate::quantity::{GROUND, MEMORY};
 use crate::terrain::HapticCells;
 use heightfield::{
     Encoding, Endian, Fill, OpenOptions, PngChannel, RawLayout, SampleType, metres_in,
@@ -67,7 +67,7 @@ impl FromStr for InputSetting {
     fn from_str(text: &str) -> Result<Self, String> {
         let unknown = || {
             let keys: Vec<_> = KEYS.iter().map(|(key, it)| format!("{key}={it}")).collect();
-            format!("known are {}", keys.join(", "))
+            format!("supported are {}", keys.join(", "))
         };
         let (key, value) = text.split_once('=').ok_or_else(unknown)?;
         let key = match key {
@@ -124,7 +124,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
         before.any(|other| other.key == setting.key)
     });
     if let Some((_, InputSetting { key, .. })) = twice {
-        return Err(format!("--input {key}=… is given twice")).or_hint("give it once");
+        return Err(format!("--input {key}=… is stated twice")).or_hint("state it once");
     }
     let mut options = OpenOptions {
         max_in_memory_bytes: u64::from(OpenOptions::IN_MEMORY_MB) << 20,
@@ -154,7 +154,7 @@ pub(super) fn open_options(settings: &[InputSetting]) -> Result<OpenOptions, Fai
         }
     }
     if options.encoding.is_some() && options.png_channel.is_some() {
-        return Err("both encoding= and channel= say how colours are heights")
+        return Err("encoding= and channel= both define how colours are heights")
             .or_hint("leave one of them out");
     }
     Ok(options)
@@ -292,7 +292,7 @@ mod tests {
     #[test]
     fn contradicting_input_options_are_refused() {
         let why = options(&["band=1", "band=2"]).expect_err("twice");
-        assert!(why.contains("band=… is given twice"), "{why}");
+        assert!(why.contains("band=… is stated twice"), "{why}");
         assert!(options(&["variable=a", "asset=b"]).is_err());
         assert!(options(&["encoding=terrarium", "channel=red"]).is_err());
         assert!(options(&["gdal:A=1", "gdal:B=2"]).is_ok());

@@ -7,7 +7,6 @@ pub mod exaggeration;
 pub mod input;
 pub mod level;
 pub mod placing;
-pub mod quantity;
 pub mod recording;
 pub mod rendering;
 pub mod scale;

@@ -15,7 +15,7 @@ use heightfield::{Georeference, Raster};
 /// Height of the relief at the device below which an exaggeration is suggested, mm.
 const FLAT_MM: f64 = 4.0;
 
-/// Which part of the terrain. Without these options all of it is fitted to the workspace.
+/// The part of the terrain to render. Without these options all of it is fitted to the workspace.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Place and scale")]
 pub struct Placing {
@@ -118,7 +118,7 @@ pub(in crate::cli) fn describe(view: &Placement, terrain: &Terrain<'_>) -> Strin
         let (off, place) = (off_in_words(&worst), place_in_words(&file, worst.ground));
         let remedy = match terrain.grid().is_distorted() {
             true => "--input cells=square renders them in their true shape",
-            false => "pan there, or hold the clutch, and the cells are measured anew",
+            false => "pan there, or hold the clutch, and the cells are measured again",
         };
         text += &format!("shape          {off} where the arm reaches, at {place}; {remedy}\n");
     }
@@ -219,7 +219,7 @@ fn numbers<const COUNT: usize>(text: &str) -> Result<[f64; COUNT], String> {
     let numbers = parsed.ok().and_then(|numbers| numbers.try_into().ok());
     numbers
         .filter(|numbers: &[f64; COUNT]| numbers.iter().all(|number| number.is_finite()))
-        .ok_or_else(|| format!("{COUNT} numbers between commas are wanted"))
+        .ok_or_else(|| format!("expected {COUNT} numbers between commas"))
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 
 use super::exaggeration::Exaggeration;
 use super::level::LevelChoice;
-use super::quantity::LENGTH;
 use super::scale::MapScale;
 use super::surface::SurfaceOptions;
 use crate::cli::failure::{Failure, OrHint};
 use crate::place::{TIPS_MM, suited_height};
+use crate::quantity::LENGTH;
 use crate::terrain::{HapticCells, HapticGrid, MAX_TIP_CELLS, Scale, Terrain};
 use heightfield::Raster;
 
@@ -42,7 +42,7 @@ pub struct Rendering {
 
     /// Radius of the ball at the tip, such as 2mm
     ///
-    /// [default: 7 mm; replay 0] The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
+    /// [default: 7mm; replay 0mm] The HIP is the ball's centre; 0 is a point, the default with --level. The level is such that the
     /// radius is at most 8 cells.
     #[arg(long, value_name = "MM", allow_negative_numbers = true,
           value_parser = |text: &str| LENGTH.read_within(text, TIPS_MM))]

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::quantity::GROUND_SCALE;
 use crate::place::Sizing;
+use crate::quantity::GROUND_SCALE;
 
 /// Unit of the cell size at the device.
 const MM_PER_CELL: &str = "mm/cell";

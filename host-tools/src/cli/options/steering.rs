@@ -29,9 +29,9 @@ use crate::terrain::Terrain;
 pub struct Commands {
     /// File with commands, a line each, or - for standard input
     ///
-    /// Commands: `at 2.5 zoom 2`, `pan 5 0`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`, `friction 0.4`,
-    /// `damping 2`, `tip 3`, `shading smooth`, `texture grain 0.1 1`, `clutch on`, `clutch off`,
-    /// `reset`, `mark TEXT`.
+    /// Commands: `at 2.5s zoom 2`, `pan 5mm 0mm`, `pan 100m 0m`, `exaggerate 1.5`, `surface sand`, `stiffness 0.5`,
+    /// `friction 0.4`, `damping 2Ns/m`, `tip 3mm`, `shading smooth`, `texture grain 0.1mm 1mm`, `clutch on`,
+    /// `clutch off`, `reset`, `mark TEXT`.
     #[arg(long, value_name = "FILE", value_hint = clap::ValueHint::FilePath)]
     pub commands: Option<Origin>,
 
@@ -304,7 +304,7 @@ pub(in crate::cli) fn mark_text(mark: &Mark) -> String {
     match mark.tick {
         Some(tick) => format!("mark           `{text}` at tick {tick}, {t_s:.3} s"),
         None => format!(
-            "mark           `{text}` at about {t_s:.3} s: the device has not said which tick, and may not have raised its pin"
+            "mark           `{text}` at about {t_s:.3} s: the device has not reported its tick, and may not have raised its pin"
         ),
     }
 }

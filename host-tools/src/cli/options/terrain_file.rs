@@ -21,7 +21,7 @@ const FOLDER_VARIABLE: &str = "HAPTERRA_CACHE_DIR";
 /// Environment variable for the size of the disk cache, megabytes.
 const LIMIT_VARIABLE: &str = "HAPTERRA_CACHE_MB";
 
-/// A terrain file, and what the user says about it that it does not say itself.
+/// A terrain file, and the user's statements about it that it does not contain.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TerrainFile {
     /// Terrain: a file, a folder, a quoted pattern ('tiles/*.tif') or a URL
@@ -165,7 +165,7 @@ impl ReadingOptions {
 /// in feet would be rendered 3.28 times too steep.
 #[must_use]
 pub fn assumed_unit(raster: &Raster) -> Option<String> {
-    let assumed = "the file does not state the unit of its heights: they are taken to be metres";
+    let assumed = "the file does not state the unit of its heights: they are assumed to be metres";
     if raster.vertical_unit_from() != Certainty::Assumed {
         return None;
     }

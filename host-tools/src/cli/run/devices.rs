@@ -222,7 +222,7 @@ fn check_plants_distinct(args: &Args) -> Result<(), Failure> {
 
 fn same_plant(plant: &str) -> Failure {
     let error = format!("two devices have the plant line tcp:{plant}");
-    Failure::new(error).hint("give each emulated board a plant line of its own")
+    Failure::new(error).hint("name a separate plant line for each emulated board")
 }
 
 /// Returns the file of a device's recording, such as `felt-2.csv` for `felt.csv`.

@@ -176,9 +176,8 @@ impl<'t> Serving<'_, 't> {
 fn check_terrain_arrived(has_stalled: bool) -> Result<(), Failure> {
     match has_stalled {
         false => Ok(()),
-        true => Err("the virtual arm has waited a minute for terrain that did not arrive").or_hint(
-            "try again when its server answers; what went wrong with the file is said above",
-        ),
+        true => Err("the virtual arm has waited a minute for terrain that did not arrive")
+            .or_hint("try again when its server answers; the file's error is printed above"),
     }
 }
 

@@ -238,7 +238,7 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
             && !self.prompts.answer(number)
         {
             refuse(format!(
-                "question {number} is not open: answer the one that was asked last"
+                "question {number} is not open: answer the last one"
             ));
         }
         self.record_marks(false);

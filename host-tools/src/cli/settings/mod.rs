@@ -29,7 +29,7 @@ const COMMANDS: [&str; 3] = ["run", "demo", "replay"];
 /// Options that a settings file must not contain.
 const NOT_IN_FILE: [&str; 4] = ["settings", "help", "version", "verbose"];
 
-/// Which settings file is read.
+/// The settings file to read.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Settings")]
 pub struct SettingsOption {
@@ -289,7 +289,7 @@ fn check(
     let what = text.lines().next().unwrap_or_default();
     let what = what.strip_prefix("error: ").unwrap_or(what);
     Err(format!("{}: {what}", setting.place)).or_hint(format!(
-        "hapterra {name} --help says what --{} takes",
+        "hapterra {name} --help lists the values of --{}",
         setting.name
     ))
 }

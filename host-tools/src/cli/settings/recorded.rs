@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::Setting;
 use crate::cli::options::exaggeration::Exaggeration;
-use crate::cli::options::quantity::{FORCE, LENGTH, STIFFNESS};
 use crate::cli::options::rendering::Rendering;
 use crate::cli::options::scale::MapScale;
 use crate::cli::options::surface::SurfaceChoice;
+use crate::quantity::{FORCE, LENGTH, STIFFNESS};
 use crate::replay::Settings;
 use crate::replay::settings::RenderedTerrain;
 use crate::terrain::HapticCells;

@@ -163,7 +163,7 @@ impl ArmingPrompts {
             Event::Unanswered(request) => {
                 self.zeroing &= **request != HostRequest::Status;
                 self.push_line(format!(
-                    "the device does not answer: {request:?} was given up"
+                    "the device does not answer: {request:?} was abandoned"
                 ));
             }
             Event::Status(status) if self.zeroing => {
@@ -209,9 +209,9 @@ impl ArmingPrompts {
             }
             Mode::Confirming if report.blockers.contains(Blockers::FORCE_TOO_LARGE) => {
                 let what = Blockers::FORCE_TOO_LARGE.meaning();
-                self.push_line(format!("held back: {what}"));
+                self.push_line(format!("blocked: {what}"));
             }
-            Mode::Ramping => self.push_line("amplifiers on; force comes in"),
+            Mode::Ramping => self.push_line("amplifiers on; force ramps up"),
             Mode::Armed => self.push_line("armed"),
             Mode::Disarmed if before.is_some_and(|before| before.mode.is_driving()) => {
                 self.push_line("disarmed; amplifiers off");
@@ -244,7 +244,7 @@ impl ArmingPrompts {
         let press = &self.press_enter;
         let text = match (zeroes, fault.is_some()) {
             (true, _) => format!("put the arm into its zero pose, hold it there and {press}"),
-            (false, true) => format!("when that is seen to, {press} to clear it and arm"),
+            (false, true) => format!("when that is done, {press} to clear it and arm"),
             (false, false) => format!("when you are ready, {press} to arm"),
         };
         self.lines.push(Line {
@@ -350,6 +350,7 @@ mod tests {
         result: Err(Refusal::Blocked(Blockers::NOT_ZEROED)),
     };
 
+    /// Safety: 6.
     #[test]
     fn enter_before_the_question_is_no_answer() {
         let (press, mut prompts) = with_user();
@@ -368,6 +369,7 @@ mod tests {
         assert_eq!(prompts.requests(), []);
     }
 
+    /// Safety: 28.
     #[test]
     fn answer_counts_for_the_question_it_names() {
         let mut prompts = ArmingPrompts::listening(NoEnter);
@@ -385,6 +387,7 @@ mod tests {
         assert_eq!(prompts.requests(), [HostRequest::Status]);
     }
 
+    /// Safety: 6.
     #[test]
     fn enter_pressed_before_a_fault_is_shown_does_not_clear_it() {
         let (press, mut prompts) = with_user();
@@ -406,6 +409,7 @@ mod tests {
         assert_eq!(prompts.requests(), expected);
     }
 
+    /// Safety: 6.
     #[test]
     fn enter_arms_a_device_that_resumes_disarmed() {
         let (press, mut prompts) = with_user();

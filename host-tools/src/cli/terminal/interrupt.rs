@@ -94,7 +94,7 @@ pub(in crate::cli) fn end_without_guardian() {
     if !IS_LISTENING.load(Ordering::Relaxed) {
         exit(INTERRUPTED);
     }
-    super::writer::notify("the process that watches this one is gone: it ends");
+    super::writer::notify("the supervising process has ended: this one ends as well");
     REQUESTED.store(true, Ordering::Relaxed);
 }
 

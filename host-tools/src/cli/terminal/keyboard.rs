@@ -144,6 +144,7 @@ fn read(typed: &SyncSender<String>, is_typed: bool) {
 mod tests {
     use super::*;
 
+    /// Safety: 6.
     #[test]
     fn forget_typed_drops_typed_answers_but_not_piped_lines() {
         let (typed, lines) = sync_channel(MAX_WAITING);
@@ -160,7 +161,7 @@ mod tests {
         press.send(Pressed::Key(zoom)).expect("read");
         keyboard.forget_typed();
         assert!(!keyboard.was_pressed());
-        assert_eq!(keyboard.keys(), [zoom], "which answers nothing");
+        assert_eq!(keyboard.keys(), [zoom], "which answers no question");
         press.send(Pressed::Enter).expect("read");
         assert!(keyboard.was_pressed() && !keyboard.was_pressed());
         typed.send("y".into()).expect("read");
@@ -197,10 +198,6 @@ mod tests {
         assert_eq!(keyboard.pressed(), expected);
         keyboard.is_typed = false;
         typed.send("2".into()).expect("read");
-        assert_eq!(
-            keyboard.pressed(),
-            [],
-            "a pipe's lines are for somebody else"
-        );
+        assert_eq!(keyboard.pressed(), [], "a pipe's lines have another reader");
     }
 }

@@ -18,10 +18,10 @@ fn lines(file: &Path) -> Vec<String> {
         let (path, bytes) = (partial.path.display(), partial.bytes);
         [
             format!(
-                "note: {path} ({bytes} bytes) is what a command that was killed had written of {}",
+                "note: {path} ({bytes} bytes) is the unfinished output of a killed command, meant for {}",
                 file.display()
             ),
-            "  to keep it, give it another name (its last line may be cut); it stays until you delete it"
+            "  to keep it, rename it (its last line may be cut); it stays until you delete it"
                 .to_owned(),
         ]
     });
@@ -38,7 +38,7 @@ mod tests {
         let partial = folder.path().join("out.csv.a1B2c3.partial");
         std::fs::write(&partial, "t_s,x_mm").expect("written");
         let text = lines(&folder.path().join("out.csv")).join("\n");
-        for part in [&*partial.to_string_lossy(), "(8 bytes)", "another name"] {
+        for part in [&*partial.to_string_lossy(), "(8 bytes)", "rename it"] {
             assert!(text.contains(part), "{part} in {text}");
         }
         assert_eq!(lines(&folder.path().join("new.csv")), [""; 0]);

@@ -1,5 +1,5 @@
-//! One keyboard for several devices. A digit selects a device, and keys go to the selected device.
-//! Enter goes only to a device whose digit was pressed directly before: an Enter for one arm must
+//! One keyboard for several devices. A digit selects the device that receives the keys.
+//! Enter is only for a device whose digit was pressed directly before: an Enter for one arm must
 //! never arm another user's arm.
 //!
 //! If the terminal sends whole lines, a line with only the number of a device means that digit and
@@ -112,7 +112,7 @@ impl SharedKeyboard {
             return match is_closed {
                 true => Some(format!("{name} is not served any more")),
                 false if was == index => None,
-                false => Some(format!("keys go to {name}")),
+                false => Some(format!("keys are for {name}")),
             };
         }
         let named = state.named.take();
@@ -213,6 +213,7 @@ mod tests {
         Pressed::Key(Key::Char(key))
     }
 
+    /// Safety: 34.
     #[test]
     fn enter_reaches_only_the_device_named_right_before() {
         let device_keys = two();
@@ -226,7 +227,7 @@ mod tests {
         assert_eq!(press(&device_keys, &[key('1'), Pressed::Enter]), [""; 0]);
         assert_eq!(got(&device_keys[0]), (vec![], 1));
         let reported = press(&device_keys, &[key('2'), Pressed::Enter]);
-        assert_eq!(reported, ["keys go to [2 usb:7]"]);
+        assert_eq!(reported, ["keys are for [2 usb:7]"]);
         assert_eq!(got(&device_keys[1]), (vec![], 1));
         // The second device is still selected, but this Enter may be from the first one's user.
         no_device(press(&device_keys, &[Pressed::Enter]));

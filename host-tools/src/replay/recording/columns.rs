@@ -37,7 +37,7 @@ pub const COLUMNS: [(&[&str], &str); 12] = [
     (&["mode"], "`run`, `demo`: progress of arming"),
     (
         &["limits"],
-        "`run`, `demo`: what reduced the force, by name",
+        "`run`, `demo`: the limits that reduced the force, by name",
     ),
     (&["view"], "number of the [placement](#placements), from 0"),
 ];

@@ -202,7 +202,7 @@ impl ColumnValues {
             (Self::Counts(values), Self::Counts(more)) => values.extend(more),
             (Self::Numbers(values), Self::Numbers(more)) => values.extend(more),
             (Self::Texts(values), Self::Texts(more)) => values.extend(more),
-            // The schema gives a column the same type in all groups.
+            // By the schema, a column has the same type in all groups.
             _ => {}
         }
     }

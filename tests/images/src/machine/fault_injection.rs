@@ -92,7 +92,7 @@ impl Machine {
         self.core
             .ctl_flush_tb()
             .expect("translated code is dropped");
-        self.core.ctl_flush_tlb().expect("and what it knows");
+        self.core.ctl_flush_tlb().expect("and its data");
         self.unreadable.push(UnreadableWord {
             address,
             hook: hook.expect("a hook"),

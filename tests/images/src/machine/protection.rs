@@ -66,7 +66,7 @@ impl Machine {
         for (region, access) in registers.into_iter().filter_map(restricted) {
             self.allow(region, access);
         }
-        self.core.ctl_flush_tlb().expect("what it knows is dropped");
+        self.core.ctl_flush_tlb().expect("its data is dropped");
     }
 
     /// Allows accesses to a region of memory: elsewhere an access fails anyway.

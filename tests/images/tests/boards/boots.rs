@@ -47,6 +47,7 @@ fn run_until_reset(device: &Device<'_>, by: Stop, break_it: impl FnOnce(&mut Mac
     machine.restore(at);
 }
 
+/// Safety: images.
 #[test]
 fn panic_is_reported_after_reset_with_file_and_line() {
     let reported = after_reset(Reset::Software, |device| {
@@ -88,6 +89,7 @@ fn hard_fault_is_reported_after_reset_with_address() {
     }
 }
 
+/// Safety: 40, images.
 #[test]
 fn panic_is_reported_even_if_crash_record_creation_fails() {
     let reported = after_reset(Reset::Software, |device| {
@@ -162,6 +164,7 @@ fn store(device: &mut Device<'_>) -> Result<(), Refusal> {
     result
 }
 
+/// Safety: 17.
 #[test]
 fn full_memory_is_erased_at_the_next_start() {
     on_each(|machine, terrain, scene| {
@@ -182,7 +185,7 @@ fn full_memory_is_erased_at_the_next_start() {
         device.run_ms(300);
         let full = device.machine.borrow().bytes(areas[0], PLACE);
         assert_eq!(full, record, "{board}: nothing was erased");
-        // The start takes as long as the erase, and succeeds.
+        // The start lasts as long as the erase, and succeeds.
         let mut restarted = Device::open(device.reset(), terrain, scene);
         let status = restarted.query_status();
         assert_eq!(status.calibration, CalibrationSource::Stored, "{board}");
@@ -202,6 +205,7 @@ fn middle(machine: &Machine, place: u32) -> u32 {
     areas[0] + place * PLACE as u32 + 2 * machine.chip.flash.word
 }
 
+/// Safety: 17.
 #[test]
 fn interrupted_calibration_write_keeps_previous_record() {
     on_each(|machine, terrain, scene| {
@@ -244,6 +248,7 @@ fn interrupted_first_calibration_write_leaves_no_record() {
     });
 }
 
+/// Safety: 40.
 #[test]
 fn unreadable_program_word_stops_the_program() {
     on_each(|machine, terrain, scene| {
@@ -291,6 +296,7 @@ fn third_of_the_stack_is_never_used() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn single_bank_g474_starts_and_refuses_to_store() {
     on_each(|machine, terrain, scene| {

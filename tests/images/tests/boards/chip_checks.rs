@@ -14,6 +14,7 @@ const REVISION_V: u16 = 0x2003;
 /// FLASH_ACR of a G474, and its bit PRFTEN.
 const PREFETCH: (u32, u32) = (0x4002_2000, 1 << 8);
 
+/// Safety: images.
 #[test]
 fn chip_before_revision_v_is_refused_with_a_pattern() {
     for mut machine in machines() {
@@ -46,6 +47,7 @@ fn chip_before_revision_v_is_refused_with_a_pattern() {
     }
 }
 
+/// Safety: images.
 #[test]
 fn g474_flash_prefetch_is_enabled() {
     for mut machine in machines() {
@@ -58,6 +60,7 @@ fn g474_flash_prefetch_is_enabled() {
     }
 }
 
+/// Safety: images.
 #[test]
 fn status_reports_whether_usb_clock_follows_the_host() {
     let (raster, home_mm) = rough_ground();
@@ -76,6 +79,7 @@ fn status_reports_whether_usb_clock_follows_the_host() {
     });
 }
 
+/// Safety: images.
 #[test]
 fn probe_that_stops_reading_the_log_blocks_no_task() {
     let (raster, home_mm) = rough_ground();

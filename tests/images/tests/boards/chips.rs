@@ -73,6 +73,7 @@ fn segments_lie_in_the_chips_memory() {
     }
 }
 
+/// Safety: 41.
 #[test]
 fn stack_is_lowest_in_ram_and_overlaps_no_segment() {
     for machine in machines() {

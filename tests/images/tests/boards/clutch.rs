@@ -29,6 +29,7 @@ fn limits(device: &Device<'_>) -> Limits {
     latest(device).limits & CLUTCH_LIMITS
 }
 
+/// Safety: 15.
 #[test]
 fn clutch_switch_removes_force_and_its_release_restores_it() {
     Bench::new().on_each(|device| {
@@ -60,6 +61,7 @@ fn clutch_switch_removes_force_and_its_release_restores_it() {
     });
 }
 
+/// Safety: 15.
 #[test]
 fn bouncing_or_stuck_switch_adds_no_force() {
     Bench::new().on_each(|device| {

@@ -28,6 +28,7 @@ fn on_each(mut then: impl FnMut(Machine)) {
     }
 }
 
+/// Safety: 8, images.
 #[test]
 fn five_times_the_fastest_motion_is_counted() {
     on_each(|machine| {
@@ -53,6 +54,7 @@ fn five_times_the_fastest_motion_is_counted() {
     });
 }
 
+/// Safety: 8, images.
 #[test]
 fn disturbance_shorter_than_the_filter_is_not_counted() {
     on_each(|machine| {

@@ -82,10 +82,11 @@ fn drain(machine: &mut Machine) {
             Answer::Data(_) => 0,
             _ => silent + 1,
         };
-        machine.wait().expect("goes on");
+        machine.wait().expect("it continues");
     }
 }
 
+/// Safety: 33, images.
 #[test]
 fn clearing_no_halt_only_resets_the_toggle() {
     for mut machine in machines() {
@@ -109,6 +110,7 @@ fn clearing_no_halt_only_resets_the_toggle() {
     }
 }
 
+/// Safety: 33.
 #[test]
 fn halted_endpoint_refuses_until_the_halt_is_cleared() {
     for mut machine in machines() {
@@ -169,6 +171,7 @@ fn second_configuration_resets_the_toggles() {
     }
 }
 
+/// Safety: 33, images.
 #[test]
 fn clearing_halts_costs_a_frame_but_no_session() {
     let (raster, home_mm) = rough_ground();
@@ -186,7 +189,7 @@ fn clearing_halts_costs_a_frame_but_no_session() {
         let before = device.latest.expect("samples").tick;
         device.run_ms(50);
         let sample = device.latest.expect("samples");
-        assert!(sample.tick > before, "{board}: nothing comes any more");
+        assert!(sample.tick > before, "{board}: no packet arrives");
         assert_eq!(sample.fault, None, "{board}");
         assert!(device.machine.borrow().is_enabled(), "{board}: still on");
         assert_eq!(device.query_status().health.report.fault, None, "{board}");

@@ -85,6 +85,7 @@ fn assert_trips_in_one_tick(
     assert_reported(device, fault);
 }
 
+/// Safety: 4, response times.
 #[test]
 fn emergency_stop_trips_in_one_tick() {
     Bench::new().on_each(|device| {
@@ -95,6 +96,7 @@ fn emergency_stop_trips_in_one_tick() {
     });
 }
 
+/// Safety: 3, response times.
 #[test]
 fn deadman_release_trips_in_one_tick() {
     Bench::new().on_each(|device| {
@@ -104,6 +106,7 @@ fn deadman_release_trips_in_one_tick() {
     });
 }
 
+/// Safety: 8, response times.
 #[test]
 fn encoder_jump_trips_in_one_tick() {
     for axis in 0..3 {
@@ -116,6 +119,7 @@ fn encoder_jump_trips_in_one_tick() {
     }
 }
 
+/// Safety: 20, response times.
 #[test]
 fn cut_converter_link_trips_in_two_ticks() {
     Bench::new().on_each(|device| {
@@ -173,6 +177,7 @@ fn watchdog_is_fed_while_nothing_hangs() {
     });
 }
 
+/// Safety: 39, response times.
 #[test]
 fn hung_task_is_reset_by_the_watchdog() {
     let bench = Bench::new();
@@ -208,13 +213,14 @@ fn hung_task_is_reset_by_the_watchdog() {
     }
 }
 
+/// Safety: 39, response times.
 #[test]
 fn hung_tick_is_reset_by_the_watchdog() {
     Bench::new().on_each(|device| {
         let mut machine = device.machine.borrow_mut();
         let tick = machine.image.function_like(&["HapticLoop", "run_tick"]);
         let (off, ms) = ms_until_reset(&mut machine, tick).expect("reset");
-        assert_eq!(off, None, "nobody is left to switch them off");
+        assert_eq!(off, None, "no code is left to switch them off");
         assert_in_time(&mut machine, ms);
     });
 }
@@ -232,6 +238,7 @@ fn assert_off_at_once_and_permanently(machine: &mut Machine) {
     assert_eq!(machine.take_effects(), [], "nothing after it");
 }
 
+/// Safety: 40, response times.
 #[test]
 fn hard_fault_switches_amplifiers_off_first() {
     Bench::new().on_each(|device| {
@@ -243,6 +250,7 @@ fn hard_fault_switches_amplifiers_off_first() {
     });
 }
 
+/// Safety: 40, response times.
 #[test]
 fn panic_switches_the_amplifiers_off_first() {
     Bench::new().on_each(|device| {
@@ -257,6 +265,8 @@ fn panic_switches_the_amplifiers_off_first() {
 
 /// A reset releases the enable line, and an amplifier follows with a delay, so its command matters.
 /// A start may also take long.
+///
+/// Safety: 40, images.
 #[test]
 fn start_after_crash_commands_no_current_first() {
     Bench::new().on_each(|device| {

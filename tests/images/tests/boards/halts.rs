@@ -12,6 +12,7 @@ const HALTS_MS: [u64; 4] = [2, 5, 20, 44];
 /// switches off before it reads an encoder.
 const OFF_NS: u64 = 20_000;
 
+/// Safety: 42, images.
 #[test]
 fn first_tick_after_a_halt_has_no_force() {
     let bench = Bench::new();
@@ -56,6 +57,7 @@ fn first_tick_after_a_halt_has_no_force() {
     }
 }
 
+/// Safety: images.
 #[test]
 fn halt_is_detected_although_the_debugger_stops_the_clock() {
     Bench::new().on_each(|device| {

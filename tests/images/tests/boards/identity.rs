@@ -33,7 +33,7 @@ fn serial_number_on_usb_and_link_is_the_chip_identifier() {
         let serial = named(device.serial_number_string_index());
         let expected: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         assert_eq!(serial, expected, "{board}");
-        // The greeting on the link has the same identifier.
+        // The `Hello` message on the link has the same identifier.
         let configuration = ConfigurationDescriptor::new(&found.configuration);
         let endpoints = BulkEndpoints::find(&configuration.expect("well formed"));
         let pipes = ScriptedPipes::new(Rc::new(RefCell::new(machine)), endpoints.expect("two"));

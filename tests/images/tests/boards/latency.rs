@@ -55,6 +55,8 @@ fn max_cycles(chip: &Chip, each: &[Cycles]) -> u32 {
 }
 
 /// Slides over rough ground at a depth of a millimetre and a half.
+///
+/// Safety: images.
 #[test]
 fn interrupt_cycles_stay_within_the_documented_maximum() {
     let plane = Plane::level(HOME_MM, 55.0);

@@ -71,6 +71,7 @@ fn assert_as_after_a_reset(machine: &Machine) {
     assert!(!machine.bus().usb.is_attached(), "{board}");
 }
 
+/// Safety: 36.
 #[test]
 fn board_enters_its_loader_before_any_setup() {
     for mut machine in machines() {

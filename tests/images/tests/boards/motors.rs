@@ -58,6 +58,7 @@ fn assert_hot(status: &Status, board: &str) {
     assert_eq!(hot, [true; 3], "{board}: {winding_c}");
 }
 
+/// Safety: 12.
 #[test]
 fn motors_count_as_hot_after_power_up() {
     on_each(|mut machine, _, terrain, scene| {
@@ -69,6 +70,7 @@ fn motors_count_as_hot_after_power_up() {
     });
 }
 
+/// Safety: 12, images.
 #[test]
 fn motors_count_as_hot_if_the_ram_is_damaged() {
     on_each(|mut machine, _, terrain, scene| {
@@ -84,6 +86,7 @@ fn motors_count_as_hot_if_the_ram_is_damaged() {
     });
 }
 
+/// Safety: 12, images.
 #[test]
 fn motor_temperatures_survive_a_reset_under_load() {
     on_each(|mut machine, plane, terrain, scene| {

@@ -51,6 +51,7 @@ fn ends(device: &mut Device<'_>, at_most: usize) -> (usize, Option<Fault>) {
     (took, reported)
 }
 
+/// Safety: 20, images.
 #[test]
 fn converter_frames_keep_the_data_sheets_minimum_gap() {
     on_each_armed(
@@ -83,6 +84,7 @@ fn converter_frames_keep_the_data_sheets_minimum_gap() {
     );
 }
 
+/// Safety: 20, images.
 #[test]
 fn converter_without_read_back_keeps_the_amplifiers_off() {
     on_each_board(&ground(), HOME_MM, |machine, terrain, scene| {
@@ -108,6 +110,7 @@ fn converter_without_read_back_keeps_the_amplifiers_off() {
     });
 }
 
+/// Safety: 20, response times, images.
 #[test]
 fn cleared_converter_trips_within_eight_ticks() {
     on_each_armed(
@@ -124,6 +127,7 @@ fn cleared_converter_trips_within_eight_ticks() {
     );
 }
 
+/// Safety: 20, response times.
 #[test]
 fn broken_read_back_wire_trips_in_two_ticks() {
     on_each_armed(
@@ -138,6 +142,7 @@ fn broken_read_back_wire_trips_in_two_ticks() {
     );
 }
 
+/// Safety: 22, response times.
 #[test]
 fn unready_amplifier_trips_in_three_ticks() {
     for axis in 0..3 {
@@ -148,13 +153,14 @@ fn unready_amplifier_trips_in_three_ticks() {
                 device.machine.borrow_mut().set_input(pin, true);
                 assert_eq!(ends(device, 9), (3, Some(Fault::AmplifierNotReady)));
                 device.run_ms(150);
-                let report = device.guard.expect("told");
+                let report = device.guard.expect("reported");
                 assert!(report.blockers.contains(Blockers::AMPLIFIER_NOT_READY));
             },
         );
     }
 }
 
+/// Safety: 23, response times, images.
 #[test]
 fn uncommanded_current_trips_a_fault_if_monitors_are_fitted() {
     for axis in 0..3 {
@@ -186,6 +192,7 @@ fn monitor_pins_are_ignored_without_monitors() {
     );
 }
 
+/// Safety: images.
 #[test]
 fn measured_currents_are_reported_in_milliamperes() {
     for machine in machines() {
@@ -221,6 +228,7 @@ fn range(machine: &Machine) -> std::ops::RangeInclusive<i32> {
     }
 }
 
+/// Safety: 21, images.
 #[test]
 fn max_currents_stay_within_the_specified_code_range() {
     on_each_armed(
@@ -249,6 +257,7 @@ fn max_currents_stay_within_the_specified_code_range() {
     );
 }
 
+/// Safety: images.
 #[test]
 fn duty_cycle_frequency_suits_an_escon() {
     for mut machine in machines() {
@@ -271,6 +280,7 @@ const CONVERTERS: [(u32, u32); 3] = [
     (0x5000_0C00, 1 << 0),
 ];
 
+/// Safety: images.
 #[test]
 fn on_chip_converters_are_enabled_only_at_zero_current() {
     for mut machine in machines() {

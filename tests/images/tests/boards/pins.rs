@@ -81,6 +81,7 @@ fn modes(machine: &Machine) -> Pins {
     pins.collect()
 }
 
+/// Safety: 8.
 #[test]
 fn pins_are_configured_as_on_the_board_page() {
     for mut machine in machines() {

@@ -78,7 +78,7 @@ fn haptic_interrupt_outranks_maskable_ones_as_documented() {
         let rows = rows(&machine);
         assert!(
             PAGE.contains(&rows),
-            "docs/explanation/priorities.md has to say:\n{rows}"
+            "docs/explanation/priorities.md must contain:\n{rows}"
         );
     }
 }
@@ -131,6 +131,7 @@ fn only_known_functions_mask_all_interrupts() {
     }
 }
 
+/// Safety: 38.
 #[test]
 fn tick_is_not_delayed_by_critical_sections_or_interrupts() {
     let (raster, home_mm) = rough_ground();

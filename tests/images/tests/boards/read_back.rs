@@ -18,6 +18,7 @@ fn ends(device: &mut Device<'_>, max: usize) -> (Option<usize>, Option<Fault>) {
     (took, device.latest.and_then(|sample| sample.fault))
 }
 
+/// Safety: 24, images.
 #[test]
 fn wrong_command_pin_reading_is_a_fault() {
     for axis in 0..3 {
@@ -40,6 +41,7 @@ fn wrong_command_pin_reading_is_a_fault() {
     }
 }
 
+/// Safety: 24, images.
 #[test]
 fn enable_pin_held_low_externally_is_a_fault() {
     Bench::new().on_each(|device| {
@@ -51,6 +53,7 @@ fn enable_pin_held_low_externally_is_a_fault() {
     });
 }
 
+/// Safety: 24, images.
 #[test]
 fn enable_pin_held_high_externally_blocks_arming() {
     let bench = Bench::new();

@@ -64,6 +64,7 @@ fn assert_low(machine: &Machine, why: &str) {
     );
 }
 
+/// Safety: 46, images.
 #[test]
 fn supply_drop_disables_amplifiers_before_the_tick_resumes() {
     let fall = |device: &mut Device<'_>, _: Scene| {
@@ -92,6 +93,7 @@ fn supply_drop_disables_amplifiers_before_the_tick_resumes() {
     });
 }
 
+/// Safety: 46, images.
 #[test]
 fn boot_waits_while_the_supply_is_low() {
     for mut machine in machines() {
@@ -117,6 +119,7 @@ fn boot_waits_while_the_supply_is_low() {
     }
 }
 
+/// Safety: 46, images.
 #[test]
 fn brown_out_is_reported_after_the_reset() {
     after(
@@ -130,6 +133,7 @@ fn brown_out_is_reported_after_the_reset() {
     );
 }
 
+/// Safety: 46.
 #[test]
 fn missing_brown_out_level_in_option_bytes_is_reported() {
     on_each(|machine, terrain, scene| {
@@ -146,6 +150,7 @@ fn missing_brown_out_level_in_option_bytes_is_reported() {
     });
 }
 
+/// Safety: 42, images.
 #[test]
 fn chip_disables_amplifiers_if_a_debugger_halts_the_core() {
     on_each(|machine, terrain, scene| {
@@ -168,6 +173,7 @@ fn chip_disables_amplifiers_if_a_debugger_halts_the_core() {
     });
 }
 
+/// Safety: 42.
 #[test]
 fn locked_core_stops_duty_cycles_and_the_watchdog_resets() {
     on_each(|machine, terrain, scene| {
@@ -200,6 +206,7 @@ fn on_each_hung(play: impl Fn(&mut Machine)) {
     });
 }
 
+/// Safety: 39.
 #[test]
 fn hung_tick_has_no_duty_cycles_after_two_periods() {
     on_each_hung(|machine| {
@@ -214,6 +221,7 @@ fn hung_tick_has_no_duty_cycles_after_two_periods() {
     });
 }
 
+/// Safety: 44.
 #[test]
 fn emergency_stop_ends_duty_cycles_without_the_program() {
     on_each_hung(|machine| {
@@ -229,6 +237,7 @@ fn emergency_stop_ends_duty_cycles_without_the_program() {
     });
 }
 
+/// Safety: 46.
 #[test]
 fn supply_drop_ends_duty_cycles_without_the_program() {
     on_each_hung(|machine| {
@@ -245,6 +254,7 @@ fn supply_drop_ends_duty_cycles_without_the_program() {
     });
 }
 
+/// Safety: 43, images.
 #[test]
 fn unreadable_memory_ends_the_duty_cycles() {
     for memory in 0..4 {
@@ -258,6 +268,7 @@ fn unreadable_memory_ends_the_duty_cycles() {
     }
 }
 
+/// Safety: 44, images.
 #[test]
 fn stop_shorter_than_a_tick_is_latched() {
     on_each(|machine, terrain, scene| {
@@ -290,6 +301,7 @@ fn stop_shorter_than_a_tick_is_latched() {
     });
 }
 
+/// Safety: 41.
 #[test]
 fn null_pointer_write_disables_amplifiers_and_changes_no_code() {
     // movs r0, #0; str r0, [r0, #0x20]; bx lr: the first word of the tick's code in ITCM.
@@ -324,6 +336,7 @@ fn null_pointer_write_disables_amplifiers_and_changes_no_code() {
     });
 }
 
+/// Safety: 41, images.
 #[test]
 fn stack_overflow_switches_off_and_overwrites_nothing() {
     // push {r0-r7, lr}; and again.
@@ -347,6 +360,7 @@ fn stack_overflow_switches_off_and_overwrites_nothing() {
     });
 }
 
+/// Safety: 40, images.
 #[test]
 fn hard_fault_during_logging_is_reported_as_hard_fault() {
     let at = Cell::new(0);
@@ -376,6 +390,7 @@ fn hard_fault_during_logging_is_reported_as_hard_fault() {
     });
 }
 
+/// Safety: 40, images.
 #[test]
 fn panic_before_the_watchdog_runs_resets_the_chip() {
     on_each(|mut machine, terrain, scene| {
@@ -384,7 +399,10 @@ fn panic_before_the_watchdog_runs_resets_the_chip() {
         let panic = machine.image.panicking();
         machine.call_instead(scan, panic);
         assert_eq!(machine.run_ms(100), Stop::Software, "{board}");
-        assert!(!machine.is_attached(), "{board}: it came before the link");
+        assert!(
+            !machine.is_attached(),
+            "{board}: it was set before the link"
+        );
         machine.restore(scan);
         machine.reset(Reset::Software);
         let mut device = Device::open(machine, terrain, scene);
@@ -408,6 +426,7 @@ fn beats(machine: &mut Machine, ticks: usize) -> usize {
     changes
 }
 
+/// Safety: 45.
 #[test]
 fn heartbeat_toggles_each_tick_only_with_amplifiers_on() {
     on_each(|machine, terrain, scene| {
@@ -423,6 +442,7 @@ fn heartbeat_toggles_each_tick_only_with_amplifiers_on() {
     });
 }
 
+/// Safety: 45.
 #[test]
 fn hung_tick_has_no_heartbeat() {
     on_each(|machine, terrain, scene| {
@@ -445,6 +465,7 @@ fn hung_tick_has_no_heartbeat() {
     });
 }
 
+/// Safety: 47, images.
 #[test]
 fn firmware_runs_without_an_external_clock() {
     for mut machine in machines() {
@@ -476,6 +497,7 @@ fn core_hz(machine: &Machine) -> u64 {
     }
 }
 
+/// Safety: images.
 #[test]
 fn core_clock_stays_in_bounds_with_a_fast_oscillator() {
     for mut machine in machines() {
@@ -488,6 +510,7 @@ fn core_clock_stays_in_bounds_with_a_fast_oscillator() {
     }
 }
 
+/// Safety: images.
 #[test]
 fn usb_oscillator_follows_the_usb_in_use() {
     for mut machine in machines() {

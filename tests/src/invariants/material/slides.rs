@@ -14,7 +14,7 @@ use crate::invariants::surface::{Patch, distance};
 use crate::scene::terrain::Kind;
 
 /// Displacements of a proxy in a tick, and distances from the HIP, for which friction is checked,
-/// cells: above half a cell a tick it is less exact (docs/explanation/effects.md).
+/// cells.
 const SLIDES: std::ops::Range<f64> = 1e-4..0.5;
 const PRESSES: std::ops::Range<f64> = 1e-3..100.0;
 /// Tolerance of the distance by which a proxy trails due to its speed, as a fraction.

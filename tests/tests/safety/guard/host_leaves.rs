@@ -17,6 +17,7 @@ fn max_step(log: &[(GuardInputs, GuardOutputs)]) -> f32 {
     steps.fold(0.0, f32::max)
 }
 
+/// Safety: 25, response times.
 #[test]
 fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     // Cells of a quarter of a millimetre: a tile is 8 mm, so the hand leaves the stored tiles.
@@ -71,14 +72,15 @@ fn force_fades_at_edge_of_stored_tiles_after_host_leaves() {
     eprintln!("limits: {why:?}");
 }
 
+/// Safety: 25, response times.
 #[test]
-fn goodbye_lets_the_force_out_gently_and_switches_off() {
+fn closing_ramps_the_force_down_and_disarms() {
     let raster = plane();
     let terrain = on_plane(&raster);
     let mut bed = Bed::new(&terrain, press(2.0).finish(), NOTHING).run(PRESSED);
     let session = bed.session.as_mut().expect("open");
     session.close(&mut |_| {}).expect("confirmed");
-    assert!(!bed.device.borrow().outputs().enabled, "as it says");
+    assert!(!bed.device.borrow().outputs().enabled, "as reported");
     bed.device.borrow_mut().run_ticks(300);
     let log = bed.log.borrow();
     let off = bed.off_at() as usize;

@@ -16,6 +16,7 @@ use std::cell::RefCell;
 
 use rig::{BEGIN, Bed, MIDDLE_MM, NOTHING, PLANE_MM, PRESSED, Wrong, on_plane, plane, press, rub};
 
+/// Safety: 1.
 #[test]
 fn arming_needs_the_switch_and_ramps_over_two_seconds() {
     let raster = plane();
@@ -40,6 +41,7 @@ fn arming_needs_the_switch_and_ramps_over_two_seconds() {
     assert!((bed.sample(PRESSED + 400).force_n.z - 1.0).abs() < 0.1);
 }
 
+/// Safety: 2.
 #[test]
 fn switch_held_from_the_start_never_arms() {
     let raster = plane();
@@ -51,6 +53,7 @@ fn switch_held_from_the_start_never_arms() {
     assert_eq!(last.blockers, Blockers::DEAD_MAN_STILL_HELD);
 }
 
+/// Safety: 3.
 #[test]
 fn fault_in_contact_zeroes_output_within_tick_and_latches() {
     type Case = (Wrong, Fault);
@@ -101,6 +104,7 @@ fn fault_in_contact_zeroes_output_within_tick_and_latches() {
     }
 }
 
+/// Safety: 5.
 #[test]
 fn rearming_after_fault_needs_clear_command_and_new_press() {
     let raster = plane();
@@ -128,6 +132,7 @@ fn rearming_after_fault_needs_clear_command_and_new_press() {
     bed.check_bounds();
 }
 
+/// Safety: 8.
 #[test]
 fn slipping_encoder_trips_the_joint_limits() {
     let raster = plane();
@@ -152,6 +157,7 @@ fn slipping_encoder_trips_the_joint_limits() {
     );
 }
 
+/// Safety: 8, response times.
 #[test]
 fn dead_encoder_under_load_is_detected() {
     let raster = plane();
@@ -185,6 +191,7 @@ fn normal_rubbing_and_pressing_trips_no_fault() {
     bed.check_bounds();
 }
 
+/// Safety: 11.
 #[test]
 fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
     let raster = plane();
@@ -202,6 +209,7 @@ fn motors_that_work_hard_are_derated_and_stay_cool_enough() {
     assert!(hottest.iter().any(|c| *c > 75.0), "{hottest:?}");
 }
 
+/// Safety: 9.
 #[test]
 fn force_drops_for_a_fast_hand_and_ends_for_a_thrown_arm() {
     let raster = plane();
@@ -237,6 +245,7 @@ fn force_drops_for_a_fast_hand_and_ends_for_a_thrown_arm() {
     );
 }
 
+/// Safety: 40.
 #[test]
 fn boot_fault_must_be_cleared_before_arming() {
     let raster = plane();

@@ -45,7 +45,7 @@ fn arming_ramp_and_force_are_unchanged_at_10_khz() {
                 samples.push(*sample);
             }
         });
-        polled.expect("goes on");
+        polled.expect("it continues");
     }
     let stats = session.stats();
     assert_eq!(

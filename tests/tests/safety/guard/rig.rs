@@ -111,7 +111,7 @@ impl<'t> Bed<'t> {
             Event::Answered { request, result } => answers.push((*request, result)),
             _ => {}
         });
-        polled.expect("goes on");
+        polled.expect("it continues");
     }
 
     pub(crate) fn request(&mut self, request: Request) {

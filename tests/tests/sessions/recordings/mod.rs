@@ -78,7 +78,7 @@ fn recording_of_another_terrain_is_refused() {
     for part in [
         "other.tif",
         "hills.tif",
-        "its heights are others",
+        "its heights differ",
         "--ignore-settings",
     ] {
         assert!(reported.contains(part), "{part} in {reported}");
@@ -401,7 +401,7 @@ fn commands_refuse_to_overwrite_sidecars_of_their_input() {
         for arguments in [
             &["replay", &terrain, &input, "-o", &output][..],
             &[&["run", &terrain, "--out", &output], &native[..]].concat(),
-            &["view", &input, &terrain, "--rrd", &output],
+            &["view", &input, &terrain, "-o", &output],
         ] {
             let reported = folder.fails(arguments);
             assert!(reported.contains("it is the input"), "{beside}: {reported}");
@@ -429,7 +429,7 @@ fn calibration_file_is_text_and_printed_by_show() {
         "none",
         "--no-store",
     ];
-    let set = ["--set", "l1-mm=215", "-o", &arm];
+    let set = ["--set", "l1=215mm", "-o", &arm];
     folder.runs(&[&native[..], &set].concat());
     let text = folder.read("arm.toml");
     assert!(text.contains("l1_mm = 215.0"), "{text}");

@@ -217,7 +217,7 @@ fn commands_are_read_from_stdin_and_missing_file_is_an_error() {
     stdin
         .write_all(b"zoom 2\nnonsense\nzoom 1e9\n")
         .expect("written");
-    // It continues when the writer is gone.
+    // It continues after the writer has ended.
     drop(stdin);
     let run = child.wait_with_output().expect("it ends");
     assert!(run.status.success(), "{}", output_text(&run));
@@ -254,7 +254,7 @@ fn cells_measured_again_after_a_far_pan_replay_bit_by_bit() {
         let (x, y) = (f64::from(column), f64::from(row));
         (3000.0 + 900.0 * (x / 7.0).sin() + 700.0 * (y / 9.0).cos()) as u32
     });
-    let pans = "at 3.6 pan-m 0 300000\nat 4.6 stiffness 0.9\nat 5.4 pan-m 0 -200000\n";
+    let pans = "at 3.6 pan 0m 300km\nat 4.6 stiffness 0.9\nat 5.4 pan 0m -200km\n";
     folder.write("commands", pans);
     let names = ["hills.asc", "demo", "commands", "demo/hills.csv"].map(|name| folder.text(name));
     let [terrain, out, commands, recording] = &names;

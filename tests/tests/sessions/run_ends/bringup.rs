@@ -52,7 +52,7 @@ fn armed(served: &SocketDevice, bench: &Sender<Task>, folder: &Path) -> Child {
     log(served, &file);
     let mut child = Command::new(hapterra_binary())
         .args(["bringup", "--device", &format!("tcp:{}", served.address)])
-        .arg("--log")
+        .arg("-o")
         .arg(file)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -89,6 +89,7 @@ fn do_next_task(
     line.contains(&format!("> {}", Task::LowerTip))
 }
 
+/// Safety: 26.
 #[test]
 fn single_signal_disarms_and_ends_bringup() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -102,6 +103,7 @@ fn single_signal_disarms_and_ends_bringup() {
     assert_eq!(served.status().health.report.mode, Mode::Disarmed, "{text}");
 }
 
+/// Safety: 26.
 #[test]
 fn unconfirmed_bringup_end_warns_to_switch_amplifiers_off() {
     let folder = tempfile::tempdir().expect("a folder");

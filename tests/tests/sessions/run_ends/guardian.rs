@@ -1,6 +1,6 @@
-//! A worker dies while the arm is armed: its guardian disarms the board, restores the terminal and
-//! names the recording. The run is in a terminal, armed by Enter and a dead-man press; the device
-//! reports the state of the amplifiers.
+//! A worker ends abruptly while the arm is armed: its guardian disarms the board, restores the
+//! terminal and names the recording. The run is in a terminal, armed by Enter and a dead-man press;
+//! the device reports the state of the amplifiers.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -60,7 +60,7 @@ impl Armed {
         window.write_all(b"\r").expect("typed");
         shows(&mut window, "waits for your hand");
         pressed.store(true, Ordering::Relaxed);
-        shows(&mut window, "amplifiers on; force comes in");
+        shows(&mut window, "amplifiers on; force ramps up");
         assert!(amplifiers.load(Ordering::Relaxed), "armed");
         assert_ne!(modes(&end), before, "keys come one by one");
         Self {
@@ -164,6 +164,8 @@ pub(super) fn partial(folder: &Path) -> Option<String> {
 /// Neither can be caused for real. No known input overflows a stack, and a running thread already
 /// has the pages of its stack. A worker whose address space is limited to its present size
 /// continues to serve for minutes, because it requests no more.
+///
+/// Safety: 27.
 #[test]
 fn worker_killed_while_armed_is_disarmed_by_guardian() {
     for (name, number) in [("ABRT", 6), ("KILL", 9)] {
@@ -184,6 +186,8 @@ fn worker_killed_while_armed_is_disarmed_by_guardian() {
 
 /// A file that libgdal reads block by block, and a read that ends in SIGSEGV. Zooming out causes
 /// the background thread to read new blocks.
+///
+/// Safety: 27.
 #[test]
 fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     let place = tempfile::tempdir().expect("a folder");
@@ -201,7 +205,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     std::fs::write(&crash, "now").expect("written");
     let mut keys = armed.window.try_clone().expect("a terminal");
     let zooming = std::thread::spawn(move || {
-        // Until the terminal is gone, or the placement is as large as possible.
+        // Until the terminal is closed, or the placement is as large as possible.
         for _ in 0..8 {
             let _ = keys.write_all(b"-");
             pass(Duration::from_secs(1));
@@ -218,6 +222,7 @@ fn crash_of_libgdal_while_armed_is_disarmed_by_guardian() {
     zooming.join().expect("keys");
 }
 
+/// Safety: 27.
 #[test]
 fn unconfirmed_guardian_disarm_prints_switch_off_request() {
     let armed = Armed::new();
@@ -231,6 +236,7 @@ fn unconfirmed_guardian_disarm_prints_switch_off_request() {
     );
 }
 
+/// Safety: 27.
 #[test]
 fn each_signal_that_can_be_handled_is_a_clean_end() {
     for name in ["QUIT", "USR1", "USR2", "ALRM", "TERM"] {
@@ -248,6 +254,7 @@ fn each_signal_that_can_be_handled_is_a_clean_end() {
     }
 }
 
+/// Safety: 27.
 #[test]
 fn worker_whose_guardian_is_killed_ends_as_after_ctrl_c() {
     for name in ["KILL", "ABRT"] {
@@ -262,6 +269,8 @@ fn worker_whose_guardian_is_killed_ends_as_after_ctrl_c() {
 }
 
 /// A stopped worker represents one that reads a file without end.
+///
+/// Safety: 27.
 #[test]
 fn worker_that_does_not_react_to_ctrl_c_is_killed() {
     let armed = Armed::new();
@@ -275,6 +284,8 @@ fn worker_that_does_not_react_to_ctrl_c_is_killed() {
 
 /// Ctrl-C in a terminal reaches both processes, but counts as one: the worker may still close its
 /// session, and is not ended at once.
+///
+/// Safety: 27.
 #[test]
 fn signal_to_both_processes_counts_once() {
     let armed = Armed::new();

@@ -6,6 +6,7 @@ use hapterra_tests::greedy_device;
 use hapterra_tests::socket_device::{command, has_begun, output_text, signal};
 use hapterra_tests::timeouts::{end_of, pass};
 
+/// Safety: 26.
 #[test]
 fn greedy_device_does_not_block_the_end_of_a_run() {
     let folder = tempfile::tempdir().expect("a folder");

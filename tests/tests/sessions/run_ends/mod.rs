@@ -17,6 +17,7 @@ use hapterra_tests::hapterra_binary;
 use hapterra_tests::socket_device::{SocketDevice, command, output_text, signal, start};
 use hapterra_tests::timeouts::{end_of, pass};
 
+/// Safety: 26.
 #[test]
 fn signal_closes_the_session_with_confirmation() {
     for name in ["INT", "TERM", "HUP"] {
@@ -46,6 +47,7 @@ fn end_of_duration_closes_the_session() {
     }
 }
 
+/// Safety: 26, images.
 #[test]
 fn unconfirmed_disarm_is_reported_and_the_run_fails() {
     for name in ["INT", "TERM", "HUP"] {
@@ -91,6 +93,7 @@ fn silence_time_out_of_range_is_refused() {
     }
 }
 
+/// Safety: 31.
 #[test]
 fn stiffness_above_the_maximum_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -105,6 +108,8 @@ fn stiffness_above_the_maximum_is_refused() {
 }
 
 /// The system's limit on the size of files represents a full disk.
+///
+/// Safety: 27.
 #[test]
 fn recording_that_fills_the_disk_is_kept_and_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -134,6 +139,7 @@ fn recording_that_fills_the_disk_is_kept_and_named() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye, "{text}");
 }
 
+/// Safety: 26.
 #[test]
 fn failed_start_warns_that_the_arm_may_be_armed() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -49,6 +49,7 @@ pub(super) fn modes(end: &File) -> LocalModes {
     tcgetattr(end).expect("a terminal").local_modes
 }
 
+/// Safety: 26.
 #[test]
 fn closed_terminal_window_closes_the_session() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -66,6 +67,7 @@ fn closed_terminal_window_closes_the_session() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
 }
 
+/// Safety: 26.
 #[test]
 fn closed_output_does_not_stop_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -80,6 +82,7 @@ fn closed_output_does_not_stop_the_run() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
 }
 
+/// Safety: 26.
 #[test]
 fn full_disk_loses_only_output_lines() {
     let full = || OpenOptions::new().write(true).open("/dev/full");
@@ -98,6 +101,7 @@ fn full_disk_loses_only_output_lines() {
     assert_eq!(served.last_end(), SessionEnd::Goodbye);
 }
 
+/// Safety: 26.
 #[test]
 fn unread_output_does_not_stop_the_first_and_second_signal() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -190,8 +194,10 @@ fn second_ctrl_c_and_signal_restore_the_terminal() {
     }
 }
 
-/// Enter and keys go only to the device whose number was pressed: neither user arms the other's
+/// Enter and keys reach only the device whose number was pressed: neither user arms the other's
 /// arm.
+///
+/// Safety: 34.
 #[test]
 fn enter_and_keys_affect_only_the_selected_device() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -217,7 +223,7 @@ fn enter_and_keys_affect_only_the_selected_device() {
     window.write_all(b"\r").expect("typed");
     shown = shows(&mut window, "Enter alone is for no device");
     window.write_all(b"2").expect("typed");
-    shown += &shows(&mut window, &format!("keys go to {}", name(2).trim_end()));
+    shown += &shows(&mut window, &format!("keys are for {}", name(2).trim_end()));
     window.write_all(b"\r").expect("typed");
     shown += &shows(&mut window, &format!("{}zeroed at", name(2)));
     window.write_all(b"+").expect("typed");

@@ -54,7 +54,7 @@ fn permanent_server_error_names_file_and_reason() {
     assert!(reported.contains("valleys.tif"), "{reported}");
     server.fail(Fault::Forbidden, 1);
     let reported = open(&server, "hills.tif").expect_err("forbidden");
-    assert!(reported.contains("without a key"), "{reported}");
+    assert!(reported.contains("requires a key"), "{reported}");
     server.fail(Fault::Error500, usize::MAX);
     let reported = open(&server, "hills.tif").expect_err("broken");
     assert!(reported.contains("500"), "{reported}");
@@ -64,7 +64,7 @@ fn permanent_server_error_names_file_and_reason() {
     assert!(matches!(error.fault(), RasterError::Remote(_)), "{error}");
     for (url, why) in [
         ("ftp://h/hills.tif", "ftp://"),
-        ("https://h h/hills.tif", "cannot read what is there"),
+        ("https://h h/hills.tif", "cannot read the URL's content"),
         ("s3://", "no such file"),
     ] {
         let error = Raster::open(url, &OpenOptions::default()).expect_err(url);
@@ -72,6 +72,7 @@ fn permanent_server_error_names_file_and_reason() {
     }
 }
 
+/// Safety: 29.
 #[test]
 fn long_error_page_is_not_read_to_its_end() {
     let (_folder, server) = hills();
@@ -80,7 +81,10 @@ fn long_error_page_is_not_read_to_its_end() {
     assert!(reported.contains("there is no such file"), "{reported}");
     let (requests, bytes) = server.log();
     // Besides the data in the system's buffers.
-    assert!(bytes <= requests.len() * (16 << 20), "{bytes} bytes came");
+    assert!(
+        bytes <= requests.len() * (16 << 20),
+        "{bytes} bytes arrived"
+    );
 }
 
 #[test]
@@ -118,7 +122,7 @@ fn wait_for_height(raster: &Raster, column: u32, row: u32) -> f64 {
 fn unreadable_mask_is_an_error_unless_forbidden() {
     let (_folder, server) = hills();
     server.fail_at(".msk", Fault::Error500, usize::MAX);
-    let reported = open(&server, "hills.tif").expect_err("who knows what is masked");
+    let reported = open(&server, "hills.tif").expect_err("the mask is unknown");
     assert!(reported.contains("500"), "{reported}");
     // A server answers "forbidden" about a missing file to a user without list permission.
     server.fail_at(".msk", Fault::Forbidden, usize::MAX);
@@ -152,7 +156,7 @@ fn notes_beside_a_url_are_read_like_those_of_a_file() {
     let sidecar_requests = requests.iter().filter(|line| line.ends_with(".aux.xml"));
     assert_eq!(sidecar_requests.count(), 1, "{requests:?}");
     server.fail_at(".aux.xml", Fault::Error500, usize::MAX);
-    let reported = open(&server, "hills.tif").expect_err("who knows what is no data");
+    let reported = open(&server, "hills.tif").expect_err("no-data is unknown");
     assert!(reported.contains("500"), "{reported}");
 }
 
@@ -177,7 +181,7 @@ fn placement_reports_server_error_instead_of_no_data() {
         let reach = Reach::of(&Calibration::PREMIUM_1_5);
         let fault = Placement::new(&grid, &reach, &options).expect_err("not read");
         assert!(matches!(fault, PlaceError::Unread { .. }), "{fault}");
-        let reported = raster.check_complete().expect_err("it did not come");
+        let reported = raster.check_complete().expect_err("it did not arrive");
         assert!(
             matches!(reported.fault(), RasterError::Remote(_)),
             "{reported}"
@@ -213,7 +217,7 @@ fn check_complete_reports_failed_reads_once() {
         later_requests < 40,
         "{later_requests} requests to a server that does not answer"
     );
-    let reported = raster.check_complete().expect_err("it did not come");
+    let reported = raster.check_complete().expect_err("it did not arrive");
     assert!(
         matches!(reported.fault(), RasterError::Remote(_)),
         "{reported}"
@@ -256,7 +260,7 @@ fn missing_vrt_source_is_no_data_and_other_sources_are_read() {
     let (height, status) = raster.read_height(3700, 700, Wait::UntilRead);
     assert!(
         height.is_nan() && status.is_complete(),
-        "it is known that it is not there"
+        "its absence is certain"
     );
 }
 
@@ -277,12 +281,12 @@ fn changed_file_is_not_mixed_with_cached_blocks() {
     let (height, status) = raster.read_height(2400, 100, Wait::UntilRead);
     assert!(
         height.is_nan() && !status.is_complete(),
-        "no hole, but not known"
+        "unknown, and not no-data"
     );
     assert_eq!(
         raster.height(100, 2000),
         expected(100, 2000),
-        "what is held"
+        "the stored data"
     );
     let again = open(&server, "hills.tif").expect("the file as it is now");
     assert_eq!(again.height(2400, 100), expected(2400, 100));

@@ -71,7 +71,11 @@ fn tiles_read_ahead_need_no_request() {
     for key in keys {
         wait_until("a tile", || is_loaded(&terrain, key));
     }
-    assert_eq!(requests(&server), ahead, "the tiles asked for nothing more");
+    assert_eq!(
+        requests(&server),
+        ahead,
+        "the tiles caused no further request"
+    );
     // The whole field, or an area outside it, is not prefetched.
     terrain.grid().prefetch(0, [0, 0], [4200, 1800]);
     assert_eq!(requests_later(&server), ahead);
@@ -107,14 +111,14 @@ fn next_placement_is_prefetched_around_the_hip() {
     assert_eq!(
         requests_later(&server),
         after,
-        "the tile asks for nothing more"
+        "the tile causes no further request"
     );
 }
 
 /// `cargo test -p hapterra-url-tests --test urls prefetch -- --ignored --nocapture`: counts checks, one
 /// every 10 ms along 3000 cells, without the tile under the HIP; answers take 100 ms.
 #[test]
-#[ignore = "it prints figures, and takes as long as the hand"]
+#[ignore = "it prints figures, for as long as the hand moves"]
 fn benchmark_counts_missing_tiles_at_100_ms_latency() {
     println!("cells/s  without  ahead  of looks");
     for speed in [200, 500, 1000, 2000] {

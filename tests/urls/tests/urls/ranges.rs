@@ -74,7 +74,7 @@ fn remote_cog_matches_local_file_and_opens_with_few_bytes() {
     }
     let (before, _) = server.log();
     assert_eq!(remote.height(1500, 3), here.height(1500, 3));
-    assert_eq!(server.log().0, before, "what is here is not fetched again");
+    assert_eq!(server.log().0, before, "stored data is not fetched again");
 }
 
 #[test]

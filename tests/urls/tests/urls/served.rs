@@ -77,6 +77,7 @@ fn server_outage_is_retried_and_is_not_no_data() {
     }
     server.fail(Fault::None, 0);
     wait_for_height(&terrain);
+    assert!(raster.check_complete().is_ok(), "the outage is over");
 }
 
 /// A block of many chunks in several places of the file.
@@ -231,12 +232,12 @@ fn device_receives_tiles_only_after_they_are_loaded() {
         sent
     };
     for _ in 0..100 {
-        assert_eq!(read_all(&mut session), 0, "what has not come is not sent");
+        assert_eq!(read_all(&mut session), 0, "unloaded data is not sent");
     }
     // Requested tiles are sent without another request.
     is_mute.set(true);
     server.hold(false);
-    wait_until("a tile that has come", || read_all(&mut session) > 0);
+    wait_until("a loaded tile", || read_all(&mut session) > 0);
     is_mute.set(false);
     wait_until("more tiles", || read_all(&mut session) > 3);
     session.close(&mut |_| {}).expect("confirmed");

@@ -56,7 +56,7 @@ impl<R: BufRead> Read for Lzw<R> {
                 Ok(LzwStatus::Done) => return Ok(0),
                 Ok(_) if is_over => return Ok(0),
                 Ok(_) if done.consumed_in == 0 => {
-                    return Err(Error::new(ErrorKind::InvalidData, "it does not go on"));
+                    return Err(Error::new(ErrorKind::InvalidData, "it does not continue"));
                 }
                 Ok(_) => {}
             }

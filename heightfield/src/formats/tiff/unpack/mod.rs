@@ -44,7 +44,7 @@ pub(super) fn suits(layout: &Layout) -> bool {
 /// The reason why that is impossible.
 pub(super) fn into_file(layout: &mut Layout, disk: &DiskCache) -> io::Result<()> {
     if !suits(layout) {
-        let what = format!("what {} has packed comes as a whole", layout.compression.0);
+        let what = format!("{} unpacks its data only as a whole", layout.compression.0);
         return Err(io::Error::other(what));
     }
     let bands = layout.bands_read().count() as u64;

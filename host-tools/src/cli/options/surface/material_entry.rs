@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use super::super::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
+use crate::quantity::{ANGLE, DAMPING, LENGTH, STIFFNESS, TIME, Units};
 
 /// A table's entry for one material; fields not stated are `None`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]

@@ -11,13 +11,13 @@ use clap::ValueHint;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use hapterra_core::force::{Controller, Damping, Material, Shading, SurfaceParams};
 
-use super::quantity::{FORCE, STIFFNESS};
 use super::recording::settings_of;
 use super::terrain_file::ReadingOptions;
 use crate::cli::failure::{Failure, Hint, OrHint};
 use crate::materials::{ClassMaterial, ClassMaterials, Materials};
 use crate::named_surfaces::{NAMED_SURFACES, NamedSurface};
 use crate::place::MAX_STIFFNESS_N_PER_MM;
+use crate::quantity::{FORCE, STIFFNESS};
 use heightfield::{Raster, files_read_with};
 use numbers::{check, failure_of, with_coefficient, with_entry};
 use table::{MaterialEntry, PassivityName, ShadingName, TableFile};
@@ -46,7 +46,7 @@ pub struct SurfaceOptions {
     #[arg(long, value_name = "MU", allow_negative_numbers = true)]
     pub friction: Option<f32>,
 
-    /// Largest force, such as 8N [default: 8.5]
+    /// Largest force, such as 8N [default: 8.5N]
     #[arg(long, value_name = "N", value_parser = |text: &str| FORCE.read_single(text),
           allow_negative_numbers = true)]
     pub max_force: Option<f32>,
@@ -221,10 +221,10 @@ impl SurfaceOptions {
         };
         let place = format!("{}, line {line}:", file.display());
         Err(Failure::new(format!(
-            "a stiffness of {stiffness} N/mm: a table may ask for {max} N/mm at most"
+            "a stiffness of {stiffness} N/mm: a table may state {max} N/mm at most"
         ))
         .hint(format!(
-            "if you trust the table, say --stiffness {stiffness}"
+            "if you trust the table, add --stiffness {stiffness}"
         ))
         .about(Some(&place)))
     }

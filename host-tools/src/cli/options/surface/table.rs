@@ -158,7 +158,7 @@ impl TableFile {
                 )
             })?;
             if let Some((_, other, _)) = classes.iter().find(|(known, ..)| *known == class) {
-                return Err(bad(line, format!("class {class} is in line {other}, too")));
+                return Err(bad(line, format!("class {class} is also in line {other}")));
             }
             classes.push((class, line, entry.into_inner()));
         }
@@ -216,7 +216,7 @@ mod tests {
             .unzip();
         assert_eq!((classes, lines), (vec![-3, 10], vec![9, 5]));
         assert_eq!(table.classes[1].2.texture, Some(TextureName::Grain));
-        assert_eq!(read("").expect("nothing is said"), TableFile::default());
+        assert_eq!(read("").expect("an empty table"), TableFile::default());
     }
 
     #[test]

@@ -119,6 +119,7 @@ fn options_that_no_surface_has_are_refused() {
     }
 }
 
+/// Safety: 31.
 #[test]
 fn table_stiffness_is_limited_by_the_command_line() {
     for (text, reported, allowed) in [

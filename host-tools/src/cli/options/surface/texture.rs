@@ -67,7 +67,7 @@ fn first_number(entry: &MaterialEntry) -> Option<&'static str> {
     numbers.next().map(|(_, name)| name)
 }
 
-/// Returns a texture if its numbers can be felt and rendered.
+/// Returns a texture if it is perceptible and can be rendered.
 fn checked(texture: Texture) -> Result<Texture, String> {
     let Texture {
         amplitude_mm: amplitude,

@@ -8,7 +8,7 @@ use crate::buckets::opened::{
 };
 
 /// The user's hint.
-const HINT: &str = "hint: set what the server wants: AZURE_STORAGE_ACCOUNT_NAME";
+const HINT: &str = "hint: set the server's variables: AZURE_STORAGE_ACCOUNT_NAME";
 /// Times before which a signature is valid.
 const ONE_DAY: &str = "2100-01-31T00:00:00Z";
 const EXPIRED: &str = "2020-01-31T00:00:00Z";
@@ -192,11 +192,11 @@ fn environment_error_names_variable_and_sends_no_request() {
         ),
         (
             microsoft.output_of(&url(), &[]),
-            "the environment holds no key, and this computer has none of its own (az://hills",
+            "the environment contains no key, and this computer has none of its own (az://hills",
         ),
         (
             microsoft.output_with_key(&url(), "not base 64"),
-            "error: cannot read what is there: Invalid Access Key",
+            "error: cannot read the URL's content: Invalid Access Key",
         ),
         (output_of(&url(), &over_http), "URL scheme is not allowed"),
     ] {

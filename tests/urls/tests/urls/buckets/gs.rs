@@ -8,7 +8,7 @@ use crate::buckets::opened::{
 };
 
 /// The user's hint.
-const HINT: &str = "hint: set what the server wants: GOOGLE_APPLICATION_CREDENTIALS";
+const HINT: &str = "hint: set the server's variables: GOOGLE_APPLICATION_CREDENTIALS";
 
 /// A server of buckets, and a file for a key.
 struct Google {
@@ -108,11 +108,11 @@ fn credential_environment_errors_include_a_hint() {
     for (reported, why) in [
         (
             none,
-            "the environment holds no key, and this computer has none of its own (gs://hills",
+            "the environment contains no key, and this computer has none of its own (gs://hills",
         ),
         (
             no_file,
-            "error: cannot read what is there: Unable to open service account file from /nowhere/key.json",
+            "error: cannot read the URL's content: Unable to open service account file from /nowhere/key.json",
         ),
         (no_key, "missing field `private_key`"),
     ] {

@@ -125,7 +125,7 @@ pub(crate) fn assert_fetched_in_parts(log: &RequestLog, of: usize) {
 /// Checks that the message has the fault, the server's text, the file and the remedy.
 pub(crate) fn assert_refused(reported: &str, word: &str, hint: &str) {
     let why = format!(
-        "error: cannot read what is there: it may not be read without a key that opens it: the server says {word} ("
+        "error: cannot read the URL's content: reading it requires a key: the server reports {word} ("
     );
     assert!(reported.contains(&why), "{reported}");
     assert!(reported.contains(&format!("hills/{NAME})")), "{reported}");

@@ -24,5 +24,5 @@ fn bucket_file_opens_only_with_its_key() {
     let missing = output_with(&server, "s3://hills/south.tif", KEY);
     assert!(missing.contains("there is no such file"), "{missing}");
     let forbidden = output_with(&server, &url, [KEY[0], "sand"]);
-    assert!(forbidden.contains("without a key"), "{forbidden}");
+    assert!(forbidden.contains("requires a key"), "{forbidden}");
 }

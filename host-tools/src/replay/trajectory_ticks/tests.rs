@@ -3,12 +3,12 @@
 use super::*;
 
 /// Returns a folder, and the ticks of a path of (t_s, x_mm) in it.
-fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, Ticks) {
+fn ticks_of(text: &str, pace: Pace, tick_hz: u32) -> (tempfile::TempDir, TrajectoryTicks) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("t.csv");
     std::fs::write(&path, text).expect("written");
     let trajectory = Trajectory::open(&path).expect("a trajectory");
-    (folder, Ticks::new(trajectory, pace, tick_hz))
+    (folder, TrajectoryTicks::new(trajectory, pace, tick_hz))
 }
 
 /// Returns a path along x; the times are written unchanged.
@@ -18,7 +18,7 @@ fn path(rows: &[(&str, f64)]) -> String {
 }
 
 /// Returns time and x of each tick.
-fn read(ticks: &mut Ticks) -> Result<Vec<(f64, f64)>, String> {
+fn read(ticks: &mut TrajectoryTicks) -> Result<Vec<(f64, f64)>, String> {
     let mut all = Vec::new();
     while let Some(tick) = ticks.next_tick().map_err(|error| error.to_string())? {
         assert_eq!((tick.hip_mm[1], tick.hip_mm[2]), (7.0, -1.0));
@@ -181,7 +181,7 @@ fn impossible_times_are_errors() {
     for (rows, expected) in [
         (
             &[("0", 0.0), ("0.002", 1.0), ("0.001", 2.0)][..],
-            "line 4, column t_s: time goes back from 0.002 s to 0.001 s",
+            "line 4, column t_s: time decreases from 0.002 s to 0.001 s",
         ),
         (
             &[("0", 0.0), ("0.002", 1.0), ("0.002", 2.0)],
@@ -311,7 +311,7 @@ fn recording_rows_are_whole_ticks_apart() {
         (
             &[("0", 1.0), ("0.00025", 2.0)],
             1000,
-            "line 3, column t_s: 0.00025 s is 0.25 ticks after the row before, where the settings say 1000 ticks a second",
+            "line 3, column t_s: 0.00025 s is 0.25 ticks after the row before, but the settings state 1000 ticks a second",
         ),
         (&[("0", 1.0), ("0.0015", 2.0)], 1000, "1.5 ticks after"),
         (&[("0", 1.0), ("0.001", 2.0)], 3000, ""),

@@ -18,7 +18,7 @@ const NAMED_BY: &str = "GDAL_LIBRARY";
 const SONAMES: std::ops::RangeInclusive<u32> = 30..=60;
 
 /// A loaded libgdal with its functions.
-pub(crate) struct Loaded {
+pub(crate) struct Libgdal {
     pub(crate) functions: Functions,
     pub(crate) path: PathBuf,
     pub(crate) version: Version,
@@ -31,10 +31,10 @@ thread_local! {
     static IS_SILENT: Cell<bool> = const { Cell::new(false) };
 }
 
-impl Loaded {
+impl Libgdal {
     /// Loads the library, or returns the loaded one.
     pub(crate) fn load(settings: Settings) -> Result<Arc<Self>, Error> {
-        static LOADED: Mutex<Option<Arc<Loaded>>> = Mutex::new(None);
+        static LOADED: Mutex<Option<Arc<Libgdal>>> = Mutex::new(None);
         let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(library) = &*loaded {
             return Ok(library.clone());

@@ -25,7 +25,7 @@ use super::index::{TileIndex, wrap};
 pub const BLEND_MM_S: f32 = 50.0;
 
 /// Maximum distance of a window's tiles from the coarse fallback.
-pub(super) struct TileBlend<const D: usize> {
+pub(super) struct BlendAllowances<const D: usize> {
     /// For each slot, the present distance, and the distance from which the tile is rendered
     /// unchanged; cells.
     pub(super) slots: [[Allowance; D]; D],
@@ -49,7 +49,7 @@ impl Allowance {
     };
 }
 
-impl<const D: usize> TileBlend<D> {
+impl<const D: usize> BlendAllowances<D> {
     pub(super) const NONE: Self = Self {
         slots: [[Allowance::ANY; D]; D],
         count: 0,

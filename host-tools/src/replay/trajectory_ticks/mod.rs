@@ -1,25 +1,25 @@
 //! A trajectory in the ticks of a device, by the rule of `hapterra_touch::ticks`.
 
-mod counts;
+mod remarks;
 #[cfg(test)]
 mod tests;
 
-use hapterra_touch::ticks;
 pub use hapterra_touch::ticks::{Pace, Tick};
+use hapterra_touch::ticks::{TickError, Ticks};
 
 use super::trajectory::{Trajectory, TrajectoryError};
 
 /// A trajectory, read tick by tick.
-pub struct Ticks {
-    ticks: ticks::Ticks<Trajectory>,
+pub struct TrajectoryTicks {
+    ticks: Ticks<Trajectory>,
     tick_hz: u32,
 }
 
-impl Ticks {
+impl TrajectoryTicks {
     /// Creates the ticks of a device with `tick_hz` ticks a second, at least 1.
     #[must_use]
     pub fn new(trajectory: Trajectory, pace: Pace, tick_hz: u32) -> Self {
-        let ticks = ticks::Ticks::new(trajectory, pace, tick_hz);
+        let ticks = Ticks::new(trajectory, pace, tick_hz);
         Self { ticks, tick_hz }
     }
 
@@ -32,13 +32,13 @@ impl Ticks {
     /// own time.
     #[must_use]
     pub fn pace(&self) -> Option<String> {
-        counts::pace(self.ticks.counts(), self.tick_hz)
+        remarks::pace(self.ticks.counts(), self.tick_hz)
     }
 
     /// Returns remarks on unusual times, one sentence each.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
-        counts::remarks(self.ticks.counts())
+        remarks::remarks(self.ticks.counts())
     }
 
     /// Returns the next tick; `None` after the last.
@@ -48,8 +48,8 @@ impl Ticks {
     pub fn next_tick(&mut self) -> Result<Option<Tick>, TrajectoryError> {
         let tick = self.ticks.next().transpose();
         tick.map_err(|error| match error {
-            ticks::TickError::Row(error) => error,
-            ticks::TickError::Time { fault, .. } => self.trajectory().mistimed(fault),
+            TickError::Row(error) => error,
+            TickError::Time { fault, .. } => self.trajectory().mistimed(fault),
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Quantities on the command line: a number, and its unit if it is not the default.
+//! Quantities in options, commands and files: a number, and its unit if it is not the default.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -26,6 +26,11 @@ pub const FORCE: Units = Units {
 pub const LENGTH: Units = Units {
     name: "a length at the device",
     units: &[("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("µm", 1e-3)],
+};
+/// Distance on the ground, without the units of a length at the device.
+pub const GROUND_DISTANCE: Units = Units {
+    name: "a distance on the ground",
+    units: &[("m", 1.0), ("km", 1e3), ("ft", 0.3048)],
 };
 /// Length on the ground.
 pub const GROUND: Units = Units {
@@ -60,6 +65,26 @@ pub const DAMPING: Units = Units {
     name: "a damping",
     units: &[("Ns/m", 1.0), ("N·s/m", 1.0), ("Ns/mm", 1e3)],
 };
+/// Speed of the tip.
+pub const SPEED: Units = Units {
+    name: "a speed",
+    units: &[("mm/s", 1.0), ("cm/s", 10.0), ("m/s", 1e3)],
+};
+/// Torque of a joint.
+pub const TORQUE: Units = Units {
+    name: "a torque",
+    units: &[("Nm", 1.0), ("N·m", 1.0), ("mNm", 1e-3)],
+};
+/// Torque constant of a motor: torque for each ampere.
+pub const TORQUE_CONSTANT: Units = Units {
+    name: "a torque constant",
+    units: &[("Nm/A", 1.0), ("N·m/A", 1.0), ("mNm/A", 1e-3)],
+};
+/// Current of a motor.
+pub const CURRENT: Units = Units {
+    name: "a current",
+    units: &[("A", 1.0), ("mA", 1e-3)],
+};
 /// Angle.
 pub const ANGLE: Units = Units {
     name: "an angle",
@@ -69,6 +94,11 @@ pub const ANGLE: Units = Units {
 pub const MEMORY: Units = Units {
     name: "a size",
     units: &[("MB", 1.0), ("GB", 1024.0)],
+};
+/// Rate of data on the link; a megabyte is 10⁶ bytes.
+pub const DATA_RATE: Units = Units {
+    name: "a rate of the link",
+    units: &[("MB/s", 1.0), ("kB/s", 1e-3)],
 };
 /// Scale: ground length per device millimetre.
 pub const GROUND_SCALE: Units = Units {
@@ -177,6 +207,9 @@ mod tests {
         assert_eq!(TIME.read("2min"), Ok(120.0));
         assert_eq!(DAMPING.read("2N·s/m"), Ok(2.0));
         assert_eq!(GROUND_SCALE.read("5m/mm"), Ok(5.0));
+        assert_eq!(DATA_RATE.read("200kB/s"), Ok(0.2));
+        assert_eq!(SPEED.read("0.5m/s"), Ok(500.0));
+        assert_eq!(TORQUE_CONSTANT.read("20mNm/A"), Ok(0.02));
     }
 
     #[test]
