@@ -208,9 +208,9 @@ fn scene_change_and_clutch_bytes() {
         let query = ToDevice::Request { number: 4, request };
         assert_eq!(bytes(&query), [5, 4, 10, byte]);
     }
-    let request = Request::CancelChange { number: 200 };
+    let request = Request::CancelChange { epoch: 300 };
     let query = ToDevice::Request { number: 4, request };
-    assert_eq!(bytes(&query), [5, 4, 12, 200]);
+    assert_eq!(bytes(&query), [5, 4, 12, 0xAC, 0x02]);
     let result = Err(Refusal::NoSuchChange);
     let answer = ToHost::Answer(Answer { number: 4, result });
     assert_eq!(bytes(&answer), [8, 4, 1, 11]);

@@ -64,8 +64,8 @@ pub enum Request {
     /// is still rendered, and its tiles are requested again. Answered when the loop has decided;
     /// refused if no such change waits ([`Refusal::NoSuchChange`]).
     CancelChange {
-        /// The change's number.
-        number: u8,
+        /// Epoch of the change's scene: numbers are used again.
+        epoch: u32,
     },
 }
 
@@ -109,7 +109,7 @@ pub enum Refusal {
     /// A jog with too much current or time, or without a valid axis.
     #[error("the jog exceeds the largest current or time, or the axis does not exist")]
     NoSuchJog,
-    /// No change of placement with this number waits: it was made already, or never arrived.
+    /// No change of placement to this scene waits: it was made already, or never arrived.
     #[error("no such change of placement waits: it was made already, or never arrived")]
     NoSuchChange,
 }

@@ -150,7 +150,7 @@ impl<const D: usize> Link<'_, D> {
                 self.set_clutch(hold, room);
                 Ok(())
             }
-            Request::CancelChange { number } => match self.begin_cancel(number, room) {
+            Request::CancelChange { epoch } => match self.begin_cancel(epoch, room) {
                 Ok(()) => return Progress::Cancelling,
                 refused => refused,
             },

@@ -136,14 +136,15 @@ impl<const D: usize> Link<'_, D> {
         self.device.request.cancel_decided(refused);
     }
 
-    /// Begins to cancel the change with this number, if it is not known to be made.
-    pub(super) fn begin_cancel(&mut self, number: u8, room: CommandRoom) -> Result<(), Refusal> {
-        let waits = number == self.view && self.last_record.sample.view != self.view;
+    /// Begins to cancel the change to the scene of this epoch, if it is not known to be made.
+    pub(super) fn begin_cancel(&mut self, epoch: u32, room: CommandRoom) -> Result<(), Refusal> {
+        let is_latest = self.scene.is_some_and(|scene| scene.epoch == epoch);
+        let waits = is_latest && self.last_record.sample.view != self.view;
         let change = self.change.as_mut().filter(|_| waits);
         change.ok_or(Refusal::NoSuchChange)?.cancel = Cancel::Sent;
         // The loop would store a tile behind the command in the placement before.
         self.requester.clear_pending();
-        self.command(room, Command::CancelChange(number));
+        self.command(room, Command::CancelChange(self.view));
         Ok(())
     }
 

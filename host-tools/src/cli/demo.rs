@@ -109,6 +109,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let surface = options.load()?;
     let params = surface.params;
     let materials = surface.materials(options, (&name, &raster), &args.reading)?;
+    args.rendering.warn_if_level_is_kept(materials.is_some());
     let cells = args.reading.cells();
     let mut request = args.placing.of((&args.rendering, cells), &raster)?;
     request.grid = request.grid.with_materials(materials.as_ref());

@@ -124,6 +124,15 @@ pub struct Bounds {
     pub coarser: u8,
 }
 
+/// Measurement of the haptic cells at the place under the hand, when a placement changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// The cells are measured again, if they differ there.
+    Again,
+    /// The cells stay, for a change of the level alone.
+    Keep,
+}
+
 /// The HIP and the proxy, device millimetres of the current placement. The placement changes about
 /// the proxy, or about the HIP in the air.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,7 +181,8 @@ pub struct Changed<'r> {
 }
 
 impl Bounds {
-    /// Applies changes in order, at the place under the hand. The cells are then measured there.
+    /// Applies changes in order, at the place under the hand, where the cells are then measured
+    /// again if `measure` requests it.
     ///
     /// # Errors
     /// [`ChangeError`] of the first invalid change; then nothing is changed.
@@ -181,7 +191,7 @@ impl Bounds {
         terrain: &Terrain<'r>,
         before: &PlacedSurface,
         changes: &[PlacementChange],
-        hand: &Hand,
+        (hand, measure): (&Hand, Measure),
     ) -> Result<Changed<'r>, ChangeError> {
         let at_mm = hand.at_mm();
         let cell_mm = before.view.scale.cell_mm();
@@ -191,7 +201,9 @@ impl Bounds {
         for change in changes {
             (placed_surface, at) = self.step(&mut grid, placed_surface, at, change)?;
         }
-        if let Some(remeasured) = grid.remeasured_at(at) {
+        if measure == Measure::Again
+            && let Some(remeasured) = grid.remeasured_at(at)
+        {
             at = remeasured.of_ground(grid.to_ground(at));
             placed_surface.view = placed_surface.view.measured_as(&remeasured)?;
             grid = remeasured;

@@ -15,7 +15,7 @@ use hapterra_core::wire::request::Request;
 use self::automatic_level::AutomaticLevel;
 use super::Steer;
 use crate::link::{Event, HostRequest};
-use crate::place::{Bounds, Changed, Hand, PlacedSurface, PlacementChange};
+use crate::place::{Bounds, Changed, Hand, Measure, PlacedSurface, PlacementChange};
 use crate::terrain::Terrain;
 
 /// Maximum number of changes that wait for the clutch to open; they are then applied together.
@@ -223,6 +223,10 @@ impl<'r> Steering<'r> {
             Event::Unanswered(HostRequest::Request(Request::CancelChange { .. })) => {
                 self.on_unanswered_cancel();
             }
+            Event::Answered {
+                request: Request::CancelChange { epoch },
+                result: Err(refusal),
+            } => self.on_refused_cancel(*epoch, refusal),
             Event::Unanswered(HostRequest::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: no further change is made");
             }
@@ -235,6 +239,8 @@ impl<'r> Steering<'r> {
         self.waiting.clear();
         (self.held, self.must_measure) = (false, false);
         self.release_clutch();
+        // Behind the clutch, which replaces earlier cancels in the queue.
+        self.request_cancel();
     }
 
     fn request_clutch(&mut self, hold: ClutchMode) {
@@ -260,6 +266,13 @@ impl<'r> Steering<'r> {
         };
     }
 
+    /// Waits for the clutch if the user has taken it while a change was sent.
+    fn continue_clutch(&mut self) {
+        if self.requested_hold != ClutchMode::Released {
+            self.open_clutch();
+        }
+    }
+
     fn release_clutch(&mut self) {
         self.request_clutch(ClutchMode::Released);
         self.stage = Stage::Closing;
@@ -283,6 +296,11 @@ impl<'r> Steering<'r> {
         self.by_input &= is_held_by_input;
         // The user has taken the clutch during a change of placement: the terrain follows the hand.
         if self.held && self.requested_hold == ClutchMode::InPlace {
+            self.hold_clutch();
+        }
+        // The user does not wait for the device's answer to a change of the level.
+        let applies_level = matches!(self.stage, Stage::Applying { .. }) && self.changes_level();
+        if self.held && applies_level && self.requested_hold == ClutchMode::Released {
             self.hold_clutch();
         }
         let is_turning = sample.limits.contains(Limits::CLUTCH_MOVES) && !by_input;
@@ -318,7 +336,12 @@ impl<'r> Steering<'r> {
             }
             Stage::Open if sample.view == self.number => self.advance(sample),
             // The board's clutch input may still hold the clutch open.
-            Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
+            Stage::Closing if !is_open || by_input => {
+                self.stage = match self.changes_level() {
+                    true => Stage::InContact { samples: 0 },
+                    false => Stage::Idle,
+                };
+            }
             _ => {}
         }
     }
@@ -352,7 +375,7 @@ impl<'r> Steering<'r> {
             .waiting_since
             .get_or_insert_with(Instant::now)
             .elapsed();
-        let next = self.next_view(&self.bounds, &changes, (sample, waited < MAX_GROUND_WAIT));
+        let next = self.next_view((&self.bounds, Measure::Again), &changes, (sample, waited < MAX_GROUND_WAIT));
         if let Ok(None) = next {
             (self.waiting, self.must_measure) = (changes, must_measure);
             return;
@@ -389,7 +412,7 @@ impl<'r> Steering<'r> {
             // The proxy is on another surface than the ground that the change is computed from.
             return waits;
         }
-        match self.update_in_contact(&self.bounds, &self.waiting, sample) {
+        match self.update_in_contact((&self.bounds, Measure::Again), &self.waiting, sample) {
             Some(Some(update)) => {
                 let changes = std::mem::take(&mut self.waiting);
                 self.without_ground = 0;
@@ -412,11 +435,11 @@ impl<'r> Steering<'r> {
     #[allow(clippy::option_option)] // A wait and a refusal.
     fn update_in_contact(
         &self,
-        bounds: &Bounds,
+        (bounds, measure): (&Bounds, Measure),
         changes: &[PlacementChange],
         sample: &TickRecord,
     ) -> Option<Option<PlacementUpdate<'r>>> {
-        let Some(mut update) = self.next_view(bounds, changes, (sample, true)).ok()? else {
+        let Some(mut update) = self.next_view((bounds, measure), changes, (sample, true)).ok()? else {
             return Some(None);
         };
         let in_contact = self.contact_map(&update, sample)?;
@@ -469,12 +492,12 @@ impl<'r> Steering<'r> {
     /// `waits` is true.
     fn next_view(
         &self,
-        bounds: &Bounds,
+        (bounds, measure): (&Bounds, Measure),
         changes: &[PlacementChange],
         (sample, waits): (&TickRecord, bool),
     ) -> Result<Option<PlacementUpdate<'r>>, String> {
         let hand = self.hand(sample);
-        let changed = bounds.apply(&self.terrain, &self.now, changes, &hand);
+        let changed = bounds.apply(&self.terrain, &self.now, changes, (&hand, measure));
         let Changed {
             placed_surface,
             terrain,
@@ -519,11 +542,13 @@ impl<'r> Steering<'r> {
                 (self.now, self.terrain) = *next;
                 if in_contact.is_some() {
                     self.stage = Stage::InContact { samples: 0 };
+                    self.continue_clutch();
                 }
             }
             Some(_) if self.changes_level() => {
                 self.stage = Stage::Idle;
                 self.on_level_result(false);
+                self.continue_clutch();
             }
             Some(changes) => {
                 self.waiting.splice(..0, changes);

@@ -2,8 +2,11 @@
 
 /// Time for which the hand must be slow before the level gets finer, ms.
 const SLOW_MS: u32 = 200;
-/// Time constant of the smoothed velocity, ms: an encoder's count in one sample is no motion.
+/// Time constant of the smoothed velocity, ms: one count of an encoder has little effect on it.
 const SMOOTHING_MS: f64 = 30.0;
+/// Longest time of a motion, ms. After a longer one, such as a gap in the samples, the motion in it
+/// is unknown.
+const MAX_STEP_MS: u32 = 1_000;
 
 /// A rule with hysteresis. The level is the finest at which the hand moves at most one haptic cell
 /// in a millisecond. It becomes coarser at once, and finer after the speed has been below half of
@@ -20,7 +23,7 @@ pub(super) struct LevelBySpeed {
 }
 
 impl LevelBySpeed {
-    /// Maximum number of levels above the finest one: at more, nothing of a slope is left.
+    /// Maximum number of levels above the finest one: above that, a slope would lose its shape.
     pub(super) const MAX_COARSER: u8 = 3;
 
     /// Returns the required number of levels above the finest one.
@@ -31,7 +34,7 @@ impl LevelBySpeed {
     /// Takes a motion of the hand east and north, device millimetres, in a time; `cell_mm` is the
     /// size of the finest level's haptic cells.
     pub(super) fn take_motion(&mut self, moved_mm: [f64; 2], ms: u32, cell_mm: f64) {
-        if ms == 0 {
+        if !(1..=MAX_STEP_MS).contains(&ms) {
             return;
         }
         let share = 1.0 - (-f64::from(ms) / SMOOTHING_MS).exp();
@@ -120,6 +123,19 @@ mod tests {
             changes += u32::from(rule.coarser() != before);
         }
         assert_eq!(changes, 1);
+    }
+
+    #[test]
+    fn motion_in_more_than_a_second_is_ignored() {
+        let mut rule = LevelBySpeed::default();
+        (0..200).for_each(|_| rule.take_motion([0.07, 0.0], 1, 0.03));
+        assert_eq!(rule.coarser(), 2);
+        for ms in [1_001, u32::MAX] {
+            rule.take_motion([0.0, 0.0], ms, 0.03);
+            assert_eq!(rule.coarser(), 2, "{ms} ms");
+        }
+        rule.take_motion([0.0, 0.0], 1_000, 0.03);
+        assert_eq!(rule.coarser(), 0);
     }
 
     #[test]

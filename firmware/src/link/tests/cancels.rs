@@ -74,16 +74,16 @@ fn cancelled_change_restores_the_scene_and_its_tiles() {
         (0, Some(1_001))
     );
     rig.received.clear();
-    // Another number is unknown.
-    for number in [0, 2] {
-        rig.request(Request::CancelChange { number });
+    // The epoch of the scene before, and an unknown one.
+    for epoch in [7, 1_002] {
+        rig.request(Request::CancelChange { epoch });
         rig.run(10);
     }
     let unknown = Err(Refusal::NoSuchChange);
     assert_eq!(rig.answers(TO_CANCEL), [unknown; 2]);
     assert_eq!(rig.status().device.epoch, Some(1_001));
     rig.received.clear();
-    rig.request(Request::CancelChange { number: 1 });
+    rig.request(Request::CancelChange { epoch: 1_001 });
     rig.run(10);
     assert_eq!(rig.answers(TO_CANCEL), [Ok(())]);
     let requests = requests(&rig);
@@ -101,7 +101,7 @@ fn cancelled_change_restores_the_scene_and_its_tiles() {
     );
     assert_eq!(rig.status().device.epoch, Some(7));
     // It cannot be cancelled twice, and its number can be used again.
-    rig.request(Request::CancelChange { number: 1 });
+    rig.request(Request::CancelChange { epoch: 1_001 });
     rig.run(2_000);
     assert_eq!(rig.answers(TO_CANCEL), [Ok(()), unknown]);
     let again = change(&rig, 1, 2_001);
@@ -121,7 +121,7 @@ fn cancel_and_change_agree_on_the_placement() {
         let change = change(&rig, 1, 1_001);
         rig.send_message(&ToDevice::SceneChange(change));
         rig.run(delay);
-        rig.request(Request::CancelChange { number: 1 });
+        rig.request(Request::CancelChange { epoch: 1_001 });
         rig.run(300);
         let answers = rig.answers(TO_CANCEL);
         let is_made = rig.latest().view == 1;
@@ -163,7 +163,7 @@ fn change_in_an_unread_record_is_made() {
     for _ in 0..3 {
         let _ = tick(&mut rig);
     }
-    rig.request(Request::CancelChange { number: 1 });
+    rig.request(Request::CancelChange { epoch: 1_001 });
     rig.run(20);
     let refused = Err(Refusal::NoSuchChange);
     assert_eq!(
@@ -182,7 +182,7 @@ fn early_report_of_a_cancel_keeps_the_arm_armed() {
         let change = change(&rig, 1, 2_000 + n);
         rig.send_message(&ToDevice::SceneChange(change));
         rig.run(2);
-        rig.request(Request::CancelChange { number: 1 });
+        rig.request(Request::CancelChange { epoch: 2_000 + n });
         rig.run(1);
         rig.device.link.read_records();
         let _ = rig.device.tick_alone(rig.sense);
@@ -202,7 +202,7 @@ fn repeated_cancels_keep_the_arm_armed() {
         let change = change(&rig, 1, 2_000 + n);
         rig.send_message(&ToDevice::SceneChange(change));
         rig.run(2 + n % 3);
-        rig.request(Request::CancelChange { number: 1 });
+        rig.request(Request::CancelChange { epoch: 2_000 + n });
         rig.run(4);
         assert_eq!(rig.answers(TO_CANCEL).pop(), Some(Ok(())), "{n}");
         assert_eq!(rig.latest().mode, Mode::Armed, "{n}");
@@ -226,7 +226,7 @@ fn tiles_of_a_cancelled_change_are_dropped() {
     let (epoch, key) = *requests(&rig).last().expect("the fallback");
     assert_eq!(epoch, 1_001);
     let number = rig.number + 1;
-    let request = Request::CancelChange { number: 1 };
+    let request = Request::CancelChange { epoch: 1_001 };
     let cancel = frame(&ToDevice::Request { number, request });
     let bytes = [cancel, tile(1_001, key)].concat();
     assert_eq!(rig.device.receive(&bytes), bytes.len());
@@ -244,7 +244,7 @@ fn host_that_returns_during_a_cancel_finds_the_scene_that_stays() {
     let change = change(&rig, 1, 1_001);
     rig.send_message(&ToDevice::SceneChange(change));
     rig.run(20);
-    rig.request(Request::CancelChange { number: 1 });
+    rig.request(Request::CancelChange { epoch: 1_001 });
     rig.received.clear();
     let next = SessionNumber::new(rig.session.get() + (1 << 8));
     rig.send(&framed(next, &ToDevice::Hello(HELLO)));

@@ -23,7 +23,7 @@ impl FromStr for LevelChoice {
             BY_SPEED => Ok(Self::BySpeed),
             number => {
                 let level = number.parse().map(Self::Fixed);
-                level.map_err(|_| format!("a whole number, as 2, or {BY_SPEED}"))
+                level.map_err(|_| format!("a whole number such as 2, or {BY_SPEED}"))
             }
         }
     }
@@ -41,6 +41,22 @@ impl fmt::Display for LevelChoice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::options::rendering::Rendering;
+
+    #[test]
+    fn level_by_speed_needs_a_hand() {
+        for (level, is_valid) in [
+            (Some(LevelChoice::BySpeed), false),
+            (Some(LevelChoice::Fixed(2)), true),
+            (None, true),
+        ] {
+            let rendering = Rendering {
+                level,
+                ..Rendering::default()
+            };
+            assert_eq!(rendering.check_level_without_hand().is_ok(), is_valid);
+        }
+    }
 
     #[test]
     fn levels_are_parsed() {

@@ -69,6 +69,25 @@ impl Rendering {
         self.level == Some(LevelChoice::BySpeed)
     }
 
+    /// Checks that the level is a number, or the default, for a command without a hand.
+    ///
+    /// # Errors
+    /// The level follows the hand's speed.
+    pub fn check_level_without_hand(&self) -> Result<(), Failure> {
+        match self.is_level_by_speed() {
+            true => Err("--level by-speed is for `run` and `demo`: there is no hand here")
+                .or_hint("state a level such as --level 2, or leave the option out"),
+            false => Ok(()),
+        }
+    }
+
+    /// Logs that the level does not follow the hand's speed on a terrain with materials.
+    pub fn warn_if_level_is_kept(&self, has_materials: bool) {
+        if has_materials && self.is_level_by_speed() {
+            tracing::warn!("--level by-speed has no effect on a terrain with materials");
+        }
+    }
+
     /// Returns the scale of the options, with defaults.
     ///
     /// # Errors

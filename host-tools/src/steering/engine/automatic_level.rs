@@ -1,31 +1,39 @@
 //! Changes of the level by the hand's speed, under a pressing hand.
 //!
-//! They never open the clutch. If the device cannot make one soon, or the user requests a change,
-//! it is cancelled. The device may make it before the cancel arrives; it is then in force.
+//! The clutch stays closed unless the user requests it, or a change that the device neither makes
+//! nor cancels. If the device cannot make a change of the level soon, or the user requests another
+//! change, it is cancelled. The device may make it before the cancel arrives; it is then in force.
 
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
-use hapterra_core::wire::request::Request;
+use hapterra_core::wire::request::{Refusal, Request};
 
 use super::{MAX_SAMPLES_IN_CONTACT, Stage, Steering, presses};
 use crate::link::HostRequest;
-use crate::place::{Bounds, PlacedSurface};
+use crate::place::{Bounds, Measure, PlacedSurface};
 use crate::steering::level_by_speed::LevelBySpeed;
 use crate::terrain::Terrain;
 
 /// Samples after which a change that was sent is cancelled; a sample is a millisecond.
 const MAX_SAMPLES_SENT: u32 = 100;
-/// Samples between two attempts.
+/// Samples between two attempts; twice as many after each further one that fails.
 const PAUSE_SAMPLES: u32 = 200;
+const MAX_PAUSE_SAMPLES: u32 = 6_400;
+/// Samples after which a cancel without a result is requested again, or one that was refused counts
+/// as made if the device still renders the placement before. Heartbeats, two a second, report the
+/// device's scene.
+const MAX_SAMPLES_CANCELLING: u32 = 1_500;
 
 /// The rule, and the change that was sent, if any.
 pub(super) struct AutomaticLevel<'r> {
-    rule: LevelBySpeed,
+    pub(super) rule: LevelBySpeed,
     ticks_per_ms: u32,
     /// The last sample of the current placement.
     last: Option<TickRecord>,
     /// Samples until the next attempt.
-    pause: u32,
+    pub(super) pause: u32,
+    /// Samples to wait after the next attempt that fails.
+    next_pause: u32,
     sent: Option<SentLevel<'r>>,
 }
 
@@ -35,8 +43,31 @@ struct SentLevel<'r> {
     before: (PlacedSurface, Terrain<'r>, u8),
     /// Levels above the finest one, of the new placement; once it is accepted, of the one before.
     other_coarser: u8,
-    /// True if its cancel was requested.
-    is_cancelled: bool,
+    /// Epoch of the new placement's scene.
+    epoch: u32,
+    cancel: Cancel,
+}
+
+/// Progress of a cancel, with the samples since then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cancel {
+    NotRequested,
+    Requested {
+        samples: u32,
+    },
+    /// The device has no such change: samples of the new placement arrive, or a heartbeat with the
+    /// scene before.
+    Refused {
+        samples: u32,
+    },
+}
+
+impl AutomaticLevel<'_> {
+    /// Waits longer after each attempt that fails.
+    fn back_off(&mut self) {
+        self.pause = self.next_pause;
+        self.next_pause = (2 * self.next_pause).min(MAX_PAUSE_SAMPLES);
+    }
 }
 
 impl<'r> Steering<'r> {
@@ -47,6 +78,7 @@ impl<'r> Steering<'r> {
             ticks_per_ms: (tick_hz / 1_000).max(1),
             last: None,
             pause: 0,
+            next_pause: PAUSE_SAMPLES,
             sent: None,
         });
     }
@@ -66,8 +98,8 @@ impl<'r> Steering<'r> {
             automatic.last = None;
             return;
         }
-        if !matches!(self.stage, Stage::Applying { .. }) {
-            automatic.sent = None;
+        if !matches!(self.stage, Stage::Applying { .. }) && automatic.sent.take().is_some() {
+            automatic.next_pause = PAUSE_SAMPLES;
         }
         // Another placement has other cells, and the HIP of an open clutch does not follow the hand.
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
@@ -100,15 +132,22 @@ impl<'r> Steering<'r> {
             coarser,
             ..self.bounds
         };
-        let update = self.update_in_contact(&bounds, &[], sample).flatten();
-        let has_other_level = |level: u8| level != self.now.view.level;
-        let update = update.filter(|update| has_other_level(update.placed_surface.view.level));
+        let update = self.update_in_contact((&bounds, Measure::Keep), &[], sample).flatten();
+        let level = update
+            .as_ref()
+            .map(|update| update.placed_surface.view.level);
+        if level == Some(self.now.view.level) {
+            // It has no coarser or finer level.
+            self.bounds.coarser = coarser;
+            return;
+        }
         if let Some(automatic) = &mut self.automatic {
             automatic.pause = PAUSE_SAMPLES;
-            automatic.sent = update.is_some().then(|| SentLevel {
+            automatic.sent = update.as_ref().map(|update| SentLevel {
                 before: (self.now, self.terrain.clone(), self.number),
                 other_coarser: coarser,
-                is_cancelled: false,
+                epoch: update.view.scene.epoch,
+                cancel: Cancel::NotRequested,
             });
         }
         if let Some(update) = update {
@@ -125,11 +164,10 @@ impl<'r> Steering<'r> {
         let Some(automatic) = &mut self.automatic else {
             return;
         };
-        match &mut automatic.sent {
-            Some(sent) if accepted => {
-                std::mem::swap(&mut self.bounds.coarser, &mut sent.other_coarser);
-            }
-            _ => automatic.sent = None,
+        if let Some(sent) = automatic.sent.as_mut().filter(|_| accepted) {
+            std::mem::swap(&mut self.bounds.coarser, &mut sent.other_coarser);
+        } else if automatic.sent.take().is_some() {
+            automatic.back_off();
         }
     }
 
@@ -141,13 +179,42 @@ impl<'r> Steering<'r> {
         if self.held || (user_waits && samples > MAX_SAMPLES_IN_CONTACT) {
             return self.open_clutch();
         }
-        let number = self.number;
         let is_late = samples > MAX_SAMPLES_SENT || !presses(sample);
-        let sent = self.sent_level();
-        if let Some(sent) = sent.filter(|sent| !sent.is_cancelled && (user_waits || is_late)) {
-            sent.is_cancelled = true;
-            let cancel = Request::CancelChange { number };
+        let Some(sent) = self.sent_level() else {
+            return;
+        };
+        let is_over = match &mut sent.cancel {
+            Cancel::NotRequested => user_waits || is_late,
+            Cancel::Requested { samples } | Cancel::Refused { samples } => {
+                *samples += 1;
+                *samples > MAX_SAMPLES_CANCELLING
+            }
+        };
+        match sent.cancel {
+            Cancel::Refused { .. } if is_over && sample.view == sent.before.2 => {
+                self.on_change_cancelled();
+            }
+            _ if is_over => self.request_cancel(),
+            _ => {}
+        }
+    }
+
+    /// Requests the cancel of the change of the level that was sent, if any.
+    pub(super) fn request_cancel(&mut self) {
+        if let Some(sent) = self.sent_level() {
+            sent.cancel = Cancel::Requested { samples: 0 };
+            let cancel = Request::CancelChange { epoch: sent.epoch };
             self.requests.push(HostRequest::Request(cancel));
+        }
+    }
+
+    /// Handles the refusal of a cancel: a busy device gets another one.
+    pub(super) fn on_refused_cancel(&mut self, epoch: u32, refusal: &Refusal) {
+        if let Some(sent) = self.sent_level().filter(|sent| sent.epoch == epoch) {
+            sent.cancel = match refusal {
+                Refusal::NoSuchChange => Cancel::Refused { samples: 0 },
+                _ => Cancel::NotRequested,
+            };
         }
     }
 
@@ -159,7 +226,7 @@ impl<'r> Steering<'r> {
         let Some(sent) = automatic.sent.take() else {
             return;
         };
-        automatic.pause = PAUSE_SAMPLES;
+        automatic.back_off();
         (self.now, self.terrain, self.number) = sent.before;
         self.bounds.coarser = sent.other_coarser;
         if let Stage::InContact { .. } = self.stage {
@@ -170,7 +237,7 @@ impl<'r> Steering<'r> {
     /// Prepares another request of a cancel that the device has not answered.
     pub(super) fn on_unanswered_cancel(&mut self) {
         if let Some(sent) = self.sent_level() {
-            sent.is_cancelled = false;
+            sent.cancel = Cancel::NotRequested;
         }
     }
 
