@@ -34,13 +34,13 @@ impl Map {
         let mut header = vec!["tick_hz".to_owned(), "arm_friction".to_owned()];
         for (_, controller) in CONTROLLERS {
             for grasp in Grasp::ALL.map(Grasp::name) {
-                header.push(format!("{controller}_{grasp}_still"));
+                header.push(format!("{controller}_{grasp}"));
                 header.push(format!("{controller}_{grasp}_held"));
             }
         }
-        header.extend(["on_light_ramp", "on_light_clutch"].map(str::to_owned));
-        header.extend(TAP_SPEEDS_M_S.map(|speed| format!("off_normal_tap_at_{speed}_mj")));
-        header.extend(TAPPED_UP_TO_N_PER_MM.map(|limit| format!("on_tap_up_to_{limit}_mj")));
+        header.extend(["on_ramp", "on_clutch"].map(str::to_owned));
+        header.extend(TAP_SPEEDS_M_S.map(|speed| format!("tap_{speed}_mj")));
+        header.extend(TAPPED_UP_TO_N_PER_MM.map(|limit| format!("on_tap_{limit}_mj")));
         writeln!(to, "{}", header.join(","))?;
         let settings = self.trials.iter().map(|trial| &trial.setting);
         let mut rows: Vec<_> = settings.map(|it| (it.rate, it.arm_friction)).collect();

@@ -951,7 +951,10 @@ fn request_of_the_user_does_not_wait_for_a_cancel() {
         bench.client.enqueue(HostRequest::Request(clutch));
         bench.advance(ms(10)).expect("in time");
         let sent = bench.drain_sent();
-        assert!(sent.iter().any(|sent| sent.starts_with("2 Clutch")), "{sent:?}");
+        assert!(
+            sent.iter().any(|sent| sent.starts_with("2 Clutch")),
+            "{sent:?}"
+        );
         let (number, result) = (1, Ok(()));
         bench.deliver(&ToHost::Answer(Answer { number, result }));
         assert_eq!(bench.cancelled, 0);
@@ -959,7 +962,10 @@ fn request_of_the_user_does_not_wait_for_a_cancel() {
         assert_eq!((bench.cancelled, bench.client.scene().epoch), (1, before));
         bench.advance(ms(500)).expect("in time");
         let sent = bench.drain_sent();
-        assert!(!sent.iter().any(|sent| sent.contains("CancelChange")), "{sent:?}");
+        assert!(
+            !sent.iter().any(|sent| sent.contains("CancelChange")),
+            "{sent:?}"
+        );
         assert_eq!(bench.unanswered, []);
     });
 }

@@ -170,7 +170,12 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
             proxy_mm: None,
         };
         let back = [PlacementChange::Reset];
-        let back = bounds.apply(&changed.terrain, &changed.placed_surface, &back, (&there, Measure::Again));
+        let back = bounds.apply(
+            &changed.terrain,
+            &changed.placed_surface,
+            &back,
+            (&there, Measure::Again),
+        );
         let back = back.expect("back").placed_surface;
         assert_eq!(
             (back.view.scale, back.params),
@@ -206,7 +211,11 @@ fn refused_placement_change_names_the_bound() {
         let mut first = bounds.first;
         first.view = first.view.scaled(80.0, 8.0).expect("a scale");
         let smaller = [PlacementChange::Zoom(0.9)];
-        assert!(bounds.apply(terrain, &first, &smaller, (&hand, Measure::Again)).is_ok());
+        assert!(
+            bounds
+                .apply(terrain, &first, &smaller, (&hand, Measure::Again))
+                .is_ok()
+        );
     });
 }
 

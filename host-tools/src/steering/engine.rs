@@ -375,7 +375,11 @@ impl<'r> Steering<'r> {
             .waiting_since
             .get_or_insert_with(Instant::now)
             .elapsed();
-        let next = self.next_view((&self.bounds, Measure::Again), &changes, (sample, waited < MAX_GROUND_WAIT));
+        let next = self.next_view(
+            (&self.bounds, Measure::Again),
+            &changes,
+            (sample, waited < MAX_GROUND_WAIT),
+        );
         if let Ok(None) = next {
             (self.waiting, self.must_measure) = (changes, must_measure);
             return;
@@ -439,7 +443,10 @@ impl<'r> Steering<'r> {
         changes: &[PlacementChange],
         sample: &TickRecord,
     ) -> Option<Option<PlacementUpdate<'r>>> {
-        let Some(mut update) = self.next_view((bounds, measure), changes, (sample, true)).ok()? else {
+        let Some(mut update) = self
+            .next_view((bounds, measure), changes, (sample, true))
+            .ok()?
+        else {
             return Some(None);
         };
         let in_contact = self.contact_map(&update, sample)?;

@@ -1,8 +1,9 @@
 //! Changes of the level by the hand's speed, under a pressing hand.
 //!
-//! The clutch stays closed unless the user requests it, or a change that the device neither makes
-//! nor cancels. If the device cannot make a change of the level soon, or the user requests another
-//! change, it is cancelled. The device may make it before the cancel arrives; it is then in force.
+//! A change that the device cannot make soon is cancelled, as is one before a change of the user.
+//! The device may make it before the cancel arrives; it is then in force. The changes of the level
+//! open no clutch. Only if a change of the user waits for a cancel for [`MAX_SAMPLES_IN_CONTACT`]
+//! samples does the clutch open; the device then makes both changes.
 
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
@@ -132,7 +133,9 @@ impl<'r> Steering<'r> {
             coarser,
             ..self.bounds
         };
-        let update = self.update_in_contact((&bounds, Measure::Keep), &[], sample).flatten();
+        let update = self
+            .update_in_contact((&bounds, Measure::Keep), &[], sample)
+            .flatten();
         let level = update
             .as_ref()
             .map(|update| update.placed_surface.view.level);

@@ -55,7 +55,8 @@ impl Sliding<'_, '_> {
 
     /// Moves fast to and fro, one sample.
     fn move_on(&mut self) -> Option<SceneChange> {
-        self.east_mm = if self.tick % 24 < 12 { 2.0 } else { 8.0 } + f64::from(self.tick % 12) * 5.0;
+        self.east_mm =
+            if self.tick % 24 < 12 { 2.0 } else { 8.0 } + f64::from(self.tick % 12) * 5.0;
         self.slide(0.0, 1)
     }
 
@@ -93,8 +94,7 @@ impl Sliding<'_, '_> {
     /// Delivers the refusal of a cancel of the latest change.
     fn refuse_cancel(&mut self, why: Refusal) {
         let (request, result) = (&self.cancel(), Err(why));
-        self.steering
-            .on_event(&Event::Answered { request, result });
+        self.steering.on_event(&Event::Answered { request, result });
     }
 }
 
@@ -318,8 +318,7 @@ fn refused_cancel_has_an_end() {
         assert!(hand.cancels());
         let request = &Request::CancelChange { epoch: !hand.epoch };
         let result = Err(Refusal::Busy);
-        hand.steering
-            .on_event(&Event::Answered { request, result });
+        hand.steering.on_event(&Event::Answered { request, result });
         hand.slide(0.0, 20);
         assert!(!hand.cancels());
     });
@@ -419,7 +418,11 @@ fn change_of_the_level_keeps_the_cells_far_from_their_place() {
             proxy: sample.hip,
             ..sample
         };
-        assert!(steering.hand(&sample).has_other_cell_size(&steering.terrain));
+        assert!(
+            steering
+                .hand(&sample)
+                .has_other_cell_size(&steering.terrain)
+        );
         let automatic = steering.automatic.as_mut().expect("by speed");
         (0..100).for_each(|_| automatic.rule.take_motion([1.0, 0.0], 1, 0.1));
         steering.change_level(&sample);
