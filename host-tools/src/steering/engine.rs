@@ -238,6 +238,10 @@ impl<'r> Steering<'r> {
         self.lines.push(why.to_owned());
         self.waiting.clear();
         (self.held, self.must_measure) = (false, false);
+        if matches!(self.stage, Stage::Applying { .. }) {
+            // The answer to the change is still to arrive.
+            return self.request_clutch(ClutchMode::Released);
+        }
         self.release_clutch();
         // Behind the clutch, which replaces earlier cancels in the queue.
         self.request_cancel();

@@ -2,8 +2,8 @@
 //!
 //! A change that the device cannot make soon is cancelled, as is one before a change of the user.
 //! The device may make it before the cancel arrives; it is then in force. The changes of the level
-//! open no clutch. Only if a change of the user waits for a cancel for [`MAX_SAMPLES_IN_CONTACT`]
-//! samples does the clutch open; the device then makes both changes.
+//! open no clutch. If a change of the user still waits [`MAX_SAMPLES_IN_CONTACT`] samples after that
+//! of the level, the clutch opens for both.
 
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
@@ -20,8 +20,8 @@ const MAX_SAMPLES_SENT: u32 = 100;
 /// Samples between two attempts; twice as many after each further one that fails.
 const PAUSE_SAMPLES: u32 = 200;
 const MAX_PAUSE_SAMPLES: u32 = 6_400;
-/// Samples after which a cancel without a result is requested again, or one that was refused counts
-/// as made if the device still renders the placement before. Heartbeats, two a second, report the
+/// Samples after which a cancel without a result is requested again. A refused one then counts as
+/// made, if the device still renders the placement before. Heartbeats, two a second, report the
 /// device's scene.
 const MAX_SAMPLES_CANCELLING: u32 = 1_500;
 

@@ -370,6 +370,26 @@ fn failed_clutch_cancels_the_level() {
     });
 }
 
+/// The device answers the change after the clutch was given up.
+#[test]
+fn failed_clutch_keeps_the_level_that_is_sent() {
+    sliding(|hand| {
+        let view = hand.slide_fast().expect("a coarser level");
+        hand.steering.steer(Steer::Clutch(true));
+        hand.slide(0.0, 1);
+        let hold = ClutchMode::WithHand;
+        let unanswered = HostRequest::Request(Request::Clutch { hold });
+        hand.steering.on_event(&Event::Unanswered(&unanswered));
+        assert_eq!(hand.steering.lines().len(), 1);
+        assert_eq!(requested_hold(hand.steering), Some(ClutchMode::Released));
+        report_result(hand.steering, &view, true);
+        hand.view = 1;
+        hand.slide(0.0, 1);
+        assert!(hand.steering.is_settled());
+        assert_eq!(hand.steering.number, 1);
+    });
+}
+
 #[test]
 fn pause_doubles_after_each_cancel_until_a_success() {
     sliding(|hand| {
