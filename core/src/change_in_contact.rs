@@ -8,7 +8,8 @@
 //! blends, and the force changes as slowly as that of a closing clutch. The passivity controller
 //! starts anew, as after an open clutch.
 //!
-//! A hand that lifts off before the change keeps the old placement; the host then opens the clutch.
+//! A hand that lifts off before the change keeps the old placement; the host then opens the clutch,
+//! or cancels the change.
 
 use glam::Vec3;
 
@@ -43,6 +44,13 @@ impl<const D: usize> Haptics<'_, D> {
     pub(crate) fn cancel_change(&mut self) {
         if self.pending.take().is_some() {
             self.window.expect_fallback(None, 0);
+        }
+    }
+
+    /// Forgets the pending change if it has this number.
+    pub(crate) fn cancel_change_numbered(&mut self, number: u8) {
+        if self.pending.is_some_and(|change| change.number == number) {
+            self.cancel_change();
         }
     }
 

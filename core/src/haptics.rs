@@ -23,6 +23,8 @@ pub enum Command<'t> {
     /// Change the placement; already checked. The arm stays armed if the clutch is open; otherwise
     /// this acts as another scene.
     SceneChange(SceneChange),
+    /// Forget the change of placement with this number, if it still waits for its terrain.
+    CancelChange(u8),
     /// Hold or release the clutch.
     Clutch(ClutchMode),
     /// Set the state of the board's clutch input: true while it is held.
@@ -213,6 +215,7 @@ impl<'t, const D: usize> Haptics<'t, D> {
             Command::Scene(scene) => self.set_scene(Some(scene))?,
             Command::DropScene => self.set_scene(None)?,
             Command::SceneChange(view) => self.set_placement(&view)?,
+            Command::CancelChange(number) => self.cancel_change_numbered(number),
             Command::Clutch(hold) => self.clutch.set_mode(hold),
             Command::ClutchInput(held) => self.clutch.set_input(held),
             Command::Mark(_) => {}

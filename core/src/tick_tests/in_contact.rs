@@ -1,5 +1,8 @@
 //! Changes of the placement under a pressing hand.
 
+#[path = "in_contact_cancelled.rs"]
+mod cancelled;
+
 use core::cmp::Ordering;
 
 use super::pressed_arm::{DEEP, PressedArm};

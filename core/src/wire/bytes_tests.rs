@@ -208,6 +208,12 @@ fn scene_change_and_clutch_bytes() {
         let query = ToDevice::Request { number: 4, request };
         assert_eq!(bytes(&query), [5, 4, 10, byte]);
     }
+    let request = Request::CancelChange { epoch: 300 };
+    let query = ToDevice::Request { number: 4, request };
+    assert_eq!(bytes(&query), [5, 4, 12, 0xAC, 0x02]);
+    let result = Err(Refusal::NoSuchChange);
+    let answer = ToHost::Answer(Answer { number: 4, result });
+    assert_eq!(bytes(&answer), [8, 4, 1, 11]);
 }
 
 #[test]
@@ -299,7 +305,7 @@ fn host_hello_bytes() {
         }),
     };
     // The session is 300 | 128; then variant, protocol, number, seconds.
-    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 15, 9, 0xB4, 0x01]);
+    assert_eq!(bytes(&hello), [0xAC, 0x03, 0, 16, 9, 0xB4, 0x01]);
 }
 
 #[test]
@@ -328,7 +334,7 @@ fn device_hello_bytes() {
         },
     });
     let expected = [
-        std::vec![0, 15, 9, 8, 1, b'b'],
+        std::vec![0, 16, 9, 8, 1, b'b'],
         serial.to_vec(),
         std::vec![2, b'v', b'1', 4, 0xE8, 0x07, 0xBE, 0x01, 0xAC, 0x02, 1, 7],
         std::vec![0xAC, 0x02, 6, 3, 5, 1],

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::session::LastSession;
 
 /// Version of the table of messages.
-pub const PROTOCOL: u16 = 15;
+pub const PROTOCOL: u16 = 16;
 /// Maximum length of names in a hello, bytes.
 pub const NAME: usize = 32;
 

@@ -132,6 +132,11 @@
 //!   clutch is released at the end of its session. The board's clutch input (the limit
 //!   [`CLUTCH_INPUT`](crate::guard::Limits::CLUTCH_INPUT)) also opens the clutch, but does not
 //!   permit a new placement by itself.
+//! - A new placement that waits to change under the pressing hand
+//!   ([`SceneChange::in_contact`](crate::scene::SceneChange::in_contact)) can be cancelled
+//!   ([`Request::CancelChange`](request::Request::CancelChange)). The device then has the scene
+//!   before it, and reports its epoch. If the change was made first, the request is refused. Until
+//!   the loop has decided, an open message gets no answer.
 //! - While the device's time does not advance (an emulated board in lock-step), it repeats
 //!   unanswered requests after two heartbeats.
 //!

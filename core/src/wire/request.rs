@@ -59,6 +59,14 @@ pub enum Request {
     /// [`MARK_PULSE_MS`](crate::scene::MARK_PULSE_MS) from the end of that tick on. Answered by
     /// [`ToHost::Marked`](super::message::ToHost::Marked) when the pin may rise again.
     Mark,
+    /// Cancels a change of placement that waits for its terrain
+    /// ([`SceneChange::in_contact`](crate::scene::SceneChange::in_contact)): the placement before
+    /// is still rendered, and its tiles are requested again. Answered when the loop has decided;
+    /// refused if no such change waits ([`Refusal::NoSuchChange`]).
+    CancelChange {
+        /// Epoch of the change's scene: numbers are used again.
+        epoch: u32,
+    },
 }
 
 /// Reason why a request was refused. Nothing was changed.
@@ -101,6 +109,9 @@ pub enum Refusal {
     /// A jog with too much current or time, or without a valid axis.
     #[error("the jog exceeds the largest current or time, or the axis does not exist")]
     NoSuchJog,
+    /// No change of placement to this scene waits: it was made already, or never arrived.
+    #[error("no such change of placement waits: it was made already, or never arrived")]
+    NoSuchChange,
 }
 
 /// The answer to a request.

@@ -24,6 +24,7 @@ impl<'t, const D: usize> Link<'t, D> {
             Command::Scene(_)
                 | Command::DropScene
                 | Command::SceneChange(_)
+                | Command::CancelChange(_)
                 | Command::Clutch(_)
                 | Command::Mark(_)
                 | Command::Tile(_)

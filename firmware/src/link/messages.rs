@@ -93,6 +93,10 @@ impl<const D: usize> Link<'_, D> {
         if hello.protocol != PROTOCOL {
             return self.refuse(hello.protocol);
         }
+        // The scene to report is not decided yet; the host sends its open message again.
+        if self.is_cancelling() {
+            return;
+        }
         if hello.silence_s == READ_ONLY_SILENCE_S && !self.session.is_of(session) {
             self.read_only_session = Some(session);
             let hello = self.device.hello(hello.number, self.scene, &self.session);
@@ -227,7 +231,7 @@ impl<const D: usize> Link<'_, D> {
     /// Discards the state that depends on positions in one scene.
     fn clear_positions(&mut self) {
         self.view = 0;
-        self.is_changing = false;
+        self.forget_change();
         self.clutch = HostClutch::Released;
         self.request_hint = None;
         self.points.clear();

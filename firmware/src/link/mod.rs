@@ -54,7 +54,7 @@ use materials::LoopMaterials;
 use session::{Session, SessionState};
 pub use tiles::fill_tile;
 use tx_queue::TxQueue;
-use views::HostClutch;
+use views::{ChangeInContact, HostClutch};
 
 /// Capacity for samples that wait for the writer; when it is full, new ones are dropped.
 const SAMPLES: usize = 16;
@@ -109,9 +109,8 @@ pub struct Link<'t, const D: usize> {
     materials: Option<LoopMaterials>,
     /// Number of the latest placement; samples with another number are older.
     view: u8,
-    /// True if the latest placement changes in contact: until its samples arrive, only its fallback
-    /// is requested.
-    is_changing: bool,
+    /// The latest placement's change in contact, until it is cancelled or another one arrives.
+    change: Option<ChangeInContact>,
     clutch: HostClutch,
     requester: TileRequester<D>,
     /// Millisecond in which the tile requester last found nothing to request; cleared by any
@@ -151,7 +150,7 @@ impl<'t, const D: usize> Link<'t, D> {
             scene: None,
             materials: None,
             view: 0,
-            is_changing: false,
+            change: None,
             clutch: HostClutch::default(),
             requester: TileRequester::new(),
             nothing_to_request_at: None,

@@ -28,9 +28,10 @@ impl<const D: usize> Link<'_, D> {
 
     /// Reads the loop's records since the last poll.
     pub(super) fn read_records(&mut self) {
+        let is_taken = self.ends.commands.is_empty();
         while self.tx.has_room() {
             let Some(record) = self.ends.records.dequeue() else {
-                return;
+                return self.set_cancel_taken(is_taken);
             };
             self.nothing_to_request_at = None;
             let ticks_per_ms = self.device.ticks_per_ms();
@@ -43,6 +44,7 @@ impl<const D: usize> Link<'_, D> {
                 ));
             }
             self.last_record = record;
+            self.decide_cancel();
             if record.answered_seq.is_some() {
                 self.replay.current = None;
                 self.replay.last = Some(record);
@@ -57,7 +59,7 @@ impl<const D: usize> Link<'_, D> {
     }
 
     /// Reports the guard's state and the outcomes of requests.
-    fn report_state(&mut self) {
+    pub(super) fn report_state(&mut self) {
         // Later reports are after every command, if the loop had taken all commands before the
         // reports up to now were read.
         let follows = self.commands_drained;
@@ -71,7 +73,8 @@ impl<const D: usize> Link<'_, D> {
             self.device.request.marked(marked);
             self.device.on_health(health, self.ends.monitor.ticks());
             self.device.may_drive &= !(follows && health.report.mode == Mode::Disarmed);
-            let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch);
+            let is_refused = self.scene.is_some_and(|scene| Some(scene.epoch) != epoch)
+                && !self.is_cancelled_scene(epoch);
             // A scene that the link accepted and the loop refused is dropped.
             if follows
                 && is_refused

@@ -21,6 +21,8 @@ enum Progress {
     Marking(u8),
     /// The loop has marked this tick.
     Marked(u32),
+    /// The loop decides about the cancel of a change of placement.
+    Cancelling,
     /// It is done, or refused.
     Done(Result<(), Refusal>),
 }
@@ -78,6 +80,11 @@ impl LatestRequest {
         self.finish(Progress::Storing, result);
     }
 
+    /// Records the loop's decision on the cancel of a change.
+    pub(super) fn cancel_decided(&mut self, result: Result<(), Refusal>) {
+        self.finish(Progress::Cancelling, result);
+    }
+
     /// Records a mark of the loop.
     pub(super) fn marked(&mut self, mark: Marked) {
         if let Some((number, progress)) = self.latest
@@ -93,7 +100,9 @@ impl LatestRequest {
         let answer = match progress {
             Progress::Done(result) => ToHost::Answer(Answer { number, result }),
             Progress::Marked(tick) => ToHost::Marked { number, tick },
-            Progress::Arming | Progress::Storing | Progress::Marking(_) => return None,
+            Progress::Arming | Progress::Storing | Progress::Marking(_) | Progress::Cancelling => {
+                return None;
+            }
         };
         core::mem::take(&mut self.answer_is_due).then_some(answer)
     }
@@ -141,6 +150,10 @@ impl<const D: usize> Link<'_, D> {
                 self.set_clutch(hold, room);
                 Ok(())
             }
+            Request::CancelChange { epoch } => match self.begin_cancel(epoch, room) {
+                Ok(()) => return Progress::Cancelling,
+                refused => refused,
+            },
             Request::Mark => {
                 let number = self.device.next_mark();
                 self.command(room, Command::Mark(number));

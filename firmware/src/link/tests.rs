@@ -1,6 +1,7 @@
 //! The link against a scripted host in memory, with each fault injected byte by byte.
 
 mod buffers;
+mod cancels;
 mod commands;
 mod device_state;
 mod faults;

@@ -58,7 +58,8 @@ impl<'t, const D: usize> Link<'t, D> {
 
     /// Requests tiles, each with a buffer reserved for it.
     pub(super) fn request_tiles(&mut self) {
-        let (true, Some(scene)) = (self.session.is_open(), self.scene) else {
+        let may_request = self.session.is_open() && !self.is_cancelling();
+        let (true, Some(scene)) = (may_request, self.scene) else {
             return;
         };
         let request_hint = self.request_hint.unwrap_or_else(|| RequestHint {

@@ -9,6 +9,7 @@ use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::terrain::RequestHint;
 use hapterra_core::tick::Command;
 use hapterra_core::wire::message::ToHost;
+use hapterra_core::wire::request::Refusal;
 
 use super::Link;
 use super::commands::CommandRoom;
@@ -27,6 +28,26 @@ pub(super) enum HostClutch {
     Held,
     /// A host that has left: the clutch must be released.
     Abandoned,
+}
+
+/// A change of placement under the pressing hand, made or not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ChangeInContact {
+    /// The scene before, and the number of its placement.
+    before: (Scene, u8),
+    keeps_tiles: bool,
+    cancel: Cancel,
+}
+
+/// Progress of a cancel. A record shows its result if the loop has made it after it took the
+/// command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cancel {
+    NotRequested,
+    /// The command is in the queue.
+    Sent,
+    /// The loop has taken the command, and the records before were read.
+    Taken,
 }
 
 impl<const D: usize> Link<'_, D> {
@@ -104,11 +125,88 @@ impl<const D: usize> Link<'_, D> {
     /// Returns true if the loop still renders the placement before the latest one, whose tiles are
     /// all that it has room for.
     pub(super) fn waits_for_change(&self) -> bool {
-        self.is_changing && self.last_record.sample.view != self.view
+        self.change.is_some_and(|change| !change.keeps_tiles)
+            && self.last_record.sample.view != self.view
+    }
+
+    /// Forgets the latest change in contact; a cancel of it is refused.
+    pub(super) fn forget_change(&mut self) {
+        self.change = None;
+        let refused = Err(Refusal::NoSuchChange);
+        self.device.request.cancel_decided(refused);
+    }
+
+    /// Begins to cancel the change to the scene of this epoch, if it is not known to be made.
+    pub(super) fn begin_cancel(&mut self, epoch: u32, room: CommandRoom) -> Result<(), Refusal> {
+        let is_latest = self.scene.is_some_and(|scene| scene.epoch == epoch);
+        let waits = is_latest && self.last_record.sample.view != self.view;
+        let change = self.change.as_mut().filter(|_| waits);
+        change.ok_or(Refusal::NoSuchChange)?.cancel = Cancel::Sent;
+        // The loop would store a tile behind the command in the placement before.
+        self.requester.clear_pending();
+        self.command(room, Command::CancelChange(self.view));
+        Ok(())
+    }
+
+    /// Returns true from the request of a cancel until its result is known.
+    pub(super) fn is_cancelling(&self) -> bool {
+        let requested = |change: ChangeInContact| change.cancel != Cancel::NotRequested;
+        self.change.is_some_and(requested)
+    }
+
+    /// Returns true if this is the epoch of the scene that a cancel restores.
+    pub(super) fn is_cancelled_scene(&self, epoch: Option<u32>) -> bool {
+        let before = self.change.map(|change| change.before.0.epoch);
+        self.is_cancelling() && before == epoch
+    }
+
+    /// Records that all records were read; `is_taken` is true if the loop had taken all commands
+    /// before.
+    pub(super) fn set_cancel_taken(&mut self, is_taken: bool) {
+        if let Some(change) = &mut self.change
+            && change.cancel == Cancel::Sent
+            && is_taken
+        {
+            change.cancel = Cancel::Taken;
+        }
+    }
+
+    /// Ends a cancel that the loop has taken, by the placement in its latest record.
+    pub(super) fn decide_cancel(&mut self) {
+        let taken = |change: &mut ChangeInContact| change.cancel == Cancel::Taken;
+        let Some(change) = self.change.take_if(taken) else {
+            return;
+        };
+        let latest = &self.last_record.sample;
+        let is_made = latest.view == self.view;
+        if !is_made {
+            let (scene, number) = change.before;
+            (self.scene, self.view) = (Some(scene), number);
+            self.requester.reset(scene.level, scene.size);
+            self.requester.set_fallback(scene.fallback);
+            self.request_hint = Some(RequestHint {
+                proxy: latest.proxy.column(),
+                hip: latest.hip.column(),
+                ..RequestHint::default()
+            });
+        }
+        self.device.request.cancel_decided(match is_made {
+            true => Err(Refusal::NoSuchChange),
+            false => Ok(()),
+        });
     }
 
     fn apply_placement(&mut self, view: SceneChange, room: CommandRoom) {
-        self.is_changing = view.in_contact.is_some() && !view.keeps_tiles;
+        self.forget_change();
+        self.change = (self.scene.filter(|_| view.in_contact.is_some())).map(|before| {
+            let (before, keeps_tiles) = ((before, self.view), view.keeps_tiles);
+            let cancel = Cancel::NotRequested;
+            ChangeInContact {
+                before,
+                keeps_tiles,
+                cancel,
+            }
+        });
         let (scene, at) = (view.scene, view.hip.column());
         if !view.keeps_tiles {
             self.requester.reset(scene.level, scene.size);

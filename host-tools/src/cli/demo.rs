@@ -109,6 +109,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let surface = options.load()?;
     let params = surface.params;
     let materials = surface.materials(options, (&name, &raster), &args.reading)?;
+    args.rendering.warn_if_level_is_kept(materials.is_some());
     let cells = args.reading.cells();
     let mut request = args.placing.of((&args.rendering, cells), &raster)?;
     request.grid = request.grid.with_materials(materials.as_ref());
@@ -205,6 +206,7 @@ fn show(
     let tour = Tour {
         placed,
         stop_s,
+        is_level_by_speed: args.rendering.is_level_by_speed(),
         control: &mut control,
         viewer,
         events: server.as_ref().map(|server| args.events.watcher(server, 1)),
@@ -267,7 +269,7 @@ fn control<'t>(
     view: &Placement,
 ) -> Result<PlacementControl<'t>, Failure> {
     let (params, view) = (placed.params(), *view);
-    let arm = (&Calibration::PREMIUM_1_5, args.rendering.level);
+    let arm = (&Calibration::PREMIUM_1_5, args.rendering.fixed_level());
     let served = (placed.terrain(), PlacedSurface { view, params });
     Ok(PlacementControl::new(served, arm, args.commands.open()?))
 }
@@ -343,6 +345,7 @@ fn tour_emulated<'t>(
 struct Tour<'p, 't> {
     placed: &'p PlacedTerrain<'t>,
     stop_s: f64,
+    is_level_by_speed: bool,
     control: &'p mut PlacementControl<'t>,
     /// Its viewer.
     viewer: Option<PreparedViewer<'t>>,
@@ -360,6 +363,9 @@ impl<'t> Tour<'_, 't> {
         let (control, mut events) = (self.control, self.events);
         let arming = Some(Arming::VIRTUAL);
         let (mut session, device) = Session::open(terrain, scene, arming, transport, timeouts)?;
+        if self.is_level_by_speed {
+            control.follow_speed(device.tick_hz);
+        }
         let line = format!("device         {}\n", session_summary::device(&device));
         writer::write_text(std::io::stdout(), &line);
         let materials = terrain.grid().materials();

@@ -91,6 +91,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// # Errors
 /// As [`run`].
 pub fn run_with_rule(args: &Args, rule: Option<Rule>) -> Result<(), Failure> {
+    args.rendering.check_level_without_hand()?;
     let mut inputs = args.terrain.inputs();
     inputs.push(args.trajectory.clone());
     let of_surface = args.rendering.surface.inputs();

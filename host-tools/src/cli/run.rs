@@ -163,6 +163,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let params = surface.params;
     check_stiffness(params.stiffness_n_per_mm)?;
     let materials = surface.materials(options, (&name, &raster), reading)?;
+    args.rendering.warn_if_level_is_kept(materials.is_some());
     let cells = reading.cells();
     let mut request = args.placing.of((&args.rendering, cells), &raster)?;
     request.grid = request.grid.with_materials(materials.as_ref());

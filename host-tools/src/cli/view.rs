@@ -53,6 +53,7 @@ pub struct Args {
 /// # Errors
 /// The recording or the terrain fails, or there is no viewer.
 pub fn run(args: &Args) -> Result<(), Failure> {
+    args.rendering.check_level_without_hand()?;
     check_file(&args.recording)?;
     let rows = RecordingRows::open(&args.recording).map_err(ReplayError::from)?;
     let recorded = rows.settings().filter(|_| !args.ignore_settings).cloned();

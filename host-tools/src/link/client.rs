@@ -55,6 +55,9 @@ pub enum Event<'e> {
         /// True if it is in force.
         accepted: bool,
     },
+    /// The latest scene change was cancelled ([`Request::CancelChange`]): the scene before it stays
+    /// in force.
+    ChangeCancelled,
     /// The answer to a status query.
     Status(&'e Status),
     /// The calibration in force.
@@ -114,6 +117,9 @@ pub struct Client<'t> {
     terrain: ServedTerrain<'t>,
     /// The terrain of a scene change that is not in force yet.
     next: Option<(SceneChange, Terrain<'t>)>,
+    /// The scene before a change in contact, and its terrain, until the change is rendered or the
+    /// next one is sent.
+    before: Option<(Scene, ServedTerrain<'t>)>,
     scene: Scene,
     arming: Option<Arming>,
     protocol: HostProtocol,
@@ -185,6 +191,7 @@ impl<'t> Client<'t> {
         Self {
             terrain: ServedTerrain::Borrowed(terrain),
             next: None,
+            before: None,
             scene,
             arming,
             protocol: HostProtocol::new(Some(scene), timeouts, fastrand::Rng::with_seed(seed))
@@ -272,28 +279,51 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
     ) {
         prefetch::prefetch_around(&terrain, &view.hip);
+        self.before = None;
         self.next = Some((view, terrain));
         self.protocol.put_view(view, now, out);
     }
 
-    /// Ends the pending scene change if the protocol reports that it is in force, or if it has
-    /// failed (`over`), and reports the result.
-    fn resolve_view(&mut self, over: bool, on: &mut dyn FnMut(Event<'_>)) {
-        let epoch = self.protocol.scene().map(|scene| scene.epoch);
-        let accepted = |view: &SceneChange| epoch == Some(view.scene.epoch);
-        let settled = self.next.take_if(|(view, _)| over || accepted(view));
-        if let Some((view, terrain)) = settled {
-            let accepted = accepted(&view);
+    /// Ends the pending scene change and reports the result.
+    fn resolve_view(&mut self, accepted: bool, on: &mut dyn FnMut(Event<'_>)) {
+        if let Some((view, terrain)) = self.next.take() {
             if accepted {
-                self.scene = view.scene;
-                self.awaited.clear();
-                self.prefetch.forget();
-                self.terrain = ServedTerrain::Changed(Box::new(terrain));
+                let terrain = ServedTerrain::Changed(Box::new(terrain));
+                let before = self.serve(view.scene, terrain);
+                self.before = view.in_contact.is_some().then_some(before);
             }
             on(Event::SceneChangeResult {
                 view: &view,
                 accepted,
             });
+        }
+    }
+
+    /// Returns true if the pending scene change is in force by the epoch of the protocol's scene.
+    fn is_next_in_force(&self) -> bool {
+        let epoch = self.protocol.scene().map(|scene| scene.epoch);
+        let next = self.next.as_ref().map(|(view, _)| view.scene.epoch);
+        epoch == next
+    }
+
+    /// Serves another scene, and returns the one before.
+    fn serve(&mut self, scene: Scene, terrain: ServedTerrain<'t>) -> (Scene, ServedTerrain<'t>) {
+        self.awaited.clear();
+        self.sent.clear();
+        self.withheld.clear();
+        self.prefetch.forget();
+        let scene = std::mem::replace(&mut self.scene, scene);
+        (scene, std::mem::replace(&mut self.terrain, terrain))
+    }
+
+    /// Serves the scene before the latest change if the protocol reports that the change was
+    /// cancelled.
+    fn restore_view(&mut self, on: &mut dyn FnMut(Event<'_>)) {
+        if self.protocol.take_restored()
+            && let Some((scene, terrain)) = self.before.take()
+        {
+            self.serve(scene, terrain);
+            on(Event::ChangeCancelled);
         }
     }
 
@@ -320,7 +350,7 @@ impl<'t> Client<'t> {
         }
         let checked = self.protocol.append_due(now, out);
         if self.protocol.take_unanswered_view(now).is_some() {
-            self.resolve_view(true, on);
+            self.resolve_view(false, on);
         }
         self.repeat_point(now, out);
         for request in self.protocol.take_unanswered() {
@@ -387,12 +417,13 @@ impl<'t> Client<'t> {
         out: &mut Vec<u8>,
         on: &mut dyn FnMut(Event<'_>),
     ) {
+        self.restore_view(on);
         match event {
             ProtocolEvent::HelloReceived { device, restarted } => {
                 self.on_hello(device, restarted);
-                self.resolve_view(true, on);
+                self.resolve_view(self.is_next_in_force(), on);
             }
-            ProtocolEvent::SceneChange => self.resolve_view(true, on),
+            ProtocolEvent::SceneChange { accepted } => self.resolve_view(accepted, on),
             ProtocolEvent::SceneAck => self.on_scene_ack(now, out, on),
             ProtocolEvent::Answered(request, message) => {
                 self.on_answered(now, request, &message, out, on);
@@ -504,7 +535,12 @@ impl<'t> Client<'t> {
                         self.prefetch
                             .follow(&self.terrain, last.tick, &last.hip, tick_hz);
                     }
-                    telemetry.samples.iter().for_each(|s| on(Event::Sample(s)));
+                    for sample in &telemetry.samples {
+                        if self.protocol.on_rendered(sample.view) {
+                            self.before = None;
+                        }
+                        on(Event::Sample(sample));
+                    }
                 }
             }
             ToHost::PointAnswer { seq, sample } => {

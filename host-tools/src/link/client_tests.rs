@@ -1,8 +1,12 @@
+use hapterra_core::Vec3;
+use hapterra_core::clutch::ClutchMode;
 use hapterra_core::force::SurfaceParams;
 use hapterra_core::grid::GridPoint;
-use hapterra_core::scene::Source;
+use hapterra_core::scene::{ContactMap, Source};
 use hapterra_core::wire::frame::{decode, encode};
 use hapterra_core::wire::hello::{PROTOCOL, SerialNumber};
+use hapterra_core::wire::message::Telemetry;
+use hapterra_core::wire::request::Answer;
 use hapterra_core::wire::session::{InSession, SampleCount, SessionEnd};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -39,6 +43,8 @@ struct Bench<'t> {
     reported: Vec<Option<Calibration>>,
     /// Scene changes, and whether they were accepted.
     viewed: Vec<(u8, bool)>,
+    /// Number of cancelled scene changes.
+    cancelled: u32,
 }
 
 const fn ms(ms: u64) -> Duration {
@@ -59,6 +65,7 @@ fn on_bench(arming: Option<Arming>, test: impl FnOnce(&mut Bench<'_>)) {
         unanswered: vec![],
         reported: vec![],
         viewed: vec![],
+        cancelled: 0,
     };
     bench.client.greet(bench.now, &mut bench.out);
     test(&mut bench);
@@ -69,10 +76,12 @@ impl Bench<'_> {
         let mut frame = [0; MAX_FRAME];
         let bytes = encode(&InSession { session, message }, &mut frame).expect("fits");
         let (opened, reported, viewed) = (&mut self.opened, &mut self.reported, &mut self.viewed);
+        let cancelled = &mut self.cancelled;
         let mut on = |event: Event<'_>| match event {
             Event::Opened { .. } => *opened += 1,
             Event::Calibration(calibration) => reported.push(calibration.copied()),
             Event::SceneChangeResult { view, accepted } => viewed.push((view.number, accepted)),
+            Event::ChangeCancelled => *cancelled += 1,
             _ => {}
         };
         self.client.receive(self.now, bytes, &mut self.out, &mut on)
@@ -106,9 +115,60 @@ impl Bench<'_> {
 
     /// Sends a scene change and returns the epoch of its scene.
     fn put_view(&mut self, number: u8) -> u32 {
+        self.put_change(number, 5_000 + u32::from(number), None)
+    }
+
+    /// Sends a scene change in contact, which the device accepts.
+    fn accept_change(&mut self, number: u8, epoch: u32) {
+        let map = ContactMap {
+            from: GridPoint::default(),
+            to: GridPoint::default(),
+            scale: Vec3::ONE,
+        };
+        self.put_change(number, epoch, Some(map));
+        let accepted = true;
+        self.deliver(&ToHost::SceneAck { epoch, accepted });
+        assert_eq!(self.client.scene().epoch, epoch);
+        self.out.clear();
+    }
+
+    /// Sends a scene change in contact, which the device accepts, and requests its cancel.
+    fn cancel_change(&mut self, number: u8) {
+        let epoch = 5_000 + u32::from(number);
+        self.accept_change(number, epoch);
+        let cancel = Request::CancelChange { epoch };
+        self.client.enqueue(HostRequest::Request(cancel));
+        self.advance(ms(10)).expect("in time");
+        self.out.clear();
+    }
+
+    /// Delivers a heartbeat of a device with this scene.
+    fn report_scene(&mut self, epoch: u32) {
+        self.deliver(&ToHost::Heartbeat {
+            count: SampleCount::default(),
+            epoch: Some(epoch),
+            report: Report::default(),
+        });
+    }
+
+    /// Delivers the first sample of a placement.
+    fn report_sample(&mut self, view: u8) {
+        let sample = TickRecord {
+            view,
+            ..TickRecord::default()
+        };
+        let first = u32::from(view);
+        self.deliver(&ToHost::Telemetry(Telemetry {
+            first,
+            dropped: 0,
+            samples: std::iter::once(sample).collect(),
+        }));
+    }
+
+    fn put_change(&mut self, number: u8, epoch: u32, in_contact: Option<ContactMap>) -> u32 {
         let terrain = (*self.client.terrain).clone();
         let scene = Scene {
-            epoch: 5_000 + u32::from(number),
+            epoch,
             ..*self.client.scene()
         };
         let view = SceneChange {
@@ -116,7 +176,7 @@ impl Bench<'_> {
             scene,
             hip: GridPoint::default(),
             keeps_tiles: true,
-            in_contact: None,
+            in_contact,
         };
         self.client.put_view(self.now, view, terrain, &mut self.out);
         scene.epoch
@@ -752,4 +812,173 @@ fn epoch_after_reconnect_resolves_pending_placement() {
             assert_eq!(bench.client.scene().epoch, held);
         });
     }
+}
+
+/// The device reports the scene before the change in an answer, a heartbeat or after a reconnection.
+#[test]
+fn cancelled_placement_restores_the_scene_before() {
+    for reported_by in 0..3 {
+        on_bench(None, |bench| {
+            bench.open();
+            let before = bench.client.scene().epoch;
+            bench.cancel_change(1);
+            let (number, result) = (1, Ok(()));
+            let epoch = Some(before);
+            match reported_by {
+                0 => bench.deliver(&ToHost::Answer(Answer { number, result })),
+                1 => bench.report_scene(before),
+                _ => {
+                    bench.client.greet(bench.now, &mut bench.out);
+                    bench.deliver(&ToHost::Hello(DeviceHello {
+                        number: 2,
+                        epoch,
+                        ..hello()
+                    }));
+                    bench.deliver(&ToHost::SceneAck {
+                        epoch: before,
+                        accepted: true,
+                    });
+                }
+            }
+            assert_eq!((bench.cancelled, bench.client.scene().epoch), (1, before));
+            assert_eq!(bench.client.state(), State::Open);
+            bench.out.clear();
+            // The device gets no scene again, and the tiles of the one before.
+            bench.deliver(&bench.heartbeat());
+            bench.deliver(&ToHost::TileRequest {
+                epoch: before,
+                key: TileKey::new(0, 0, 0),
+            });
+            bench.advance(ms(600)).expect("in time");
+            let sent = bench.drain_sent();
+            let counts = ["Scene", "Tile"].map(|what| count_of(&sent, what));
+            assert_eq!(counts, [0, 1], "{sent:?}");
+            assert_eq!(bench.cancelled, 1);
+        });
+    }
+}
+
+#[test]
+fn refused_cancel_keeps_the_placement() {
+    on_bench(None, |bench| {
+        bench.open();
+        bench.cancel_change(1);
+        let epoch = bench.client.scene().epoch;
+        let (number, result) = (1, Err(Refusal::NoSuchChange));
+        bench.deliver(&ToHost::Answer(Answer { number, result }));
+        bench.deliver(&bench.heartbeat());
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (0, epoch));
+    });
+}
+
+/// The answer to the first cancel was lost, and a heartbeat has reported the cancel.
+#[test]
+fn late_answer_to_a_cancel_keeps_the_next_change() {
+    for is_sent_again in [false, true] {
+        on_bench(None, |bench| {
+            bench.open();
+            let before = bench.client.scene().epoch;
+            bench.cancel_change(1);
+            bench.report_scene(before);
+            assert_eq!(bench.cancelled, 1);
+            // The next change has the same number.
+            bench.accept_change(1, 6_001);
+            if is_sent_again {
+                let cancel = Request::CancelChange { epoch: 5_001 };
+                bench.client.enqueue(HostRequest::Request(cancel));
+            }
+            bench.advance(ms(500)).expect("in time");
+            let sent = bench.drain_sent();
+            let cancels = sent.iter().filter(|sent| sent.contains("CancelChange"));
+            assert_eq!(cancels.count() > 0, is_sent_again, "{sent:?}");
+            for number in [1, 2] {
+                let result = Ok(());
+                bench.deliver(&ToHost::Answer(Answer { number, result }));
+                assert_eq!(bench.client.scene().epoch, 6_001, "answer {number}");
+            }
+            bench.report_scene(6_001);
+            bench.advance(ms(100)).expect("in time");
+            assert_eq!(count_of(&bench.drain_sent(), "Scene"), 0);
+            assert_eq!((bench.cancelled, bench.client.state()), (1, State::Open));
+        });
+    }
+}
+
+#[test]
+fn changes_between_two_scenes_are_not_cancelled() {
+    for is_rendered in [false, true] {
+        on_bench(None, |bench| {
+            bench.open();
+            let first = bench.client.scene().epoch;
+            for (number, epoch) in [(1, 6_001), (2, first), (3, 6_001), (4, first)] {
+                bench.accept_change(number, epoch);
+                if is_rendered {
+                    bench.report_sample(number);
+                }
+                bench.report_scene(epoch);
+                assert_eq!(bench.client.scene().epoch, epoch, "change {number}");
+            }
+            assert_eq!(bench.viewed, [1, 2, 3, 4].map(|number| (number, true)));
+            assert_eq!((bench.cancelled, bench.client.state()), (0, State::Open));
+        });
+    }
+}
+
+/// A device that reports the scene before has lost the one that it has rendered.
+#[test]
+fn rendered_change_is_not_cancelled() {
+    on_bench(None, |bench| {
+        bench.open();
+        let first = bench.client.scene().epoch;
+        bench.accept_change(1, 6_001);
+        bench.report_sample(1);
+        bench.report_scene(first);
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (0, 6_001));
+        assert_eq!(count_of(&bench.drain_sent(), "Scene"), 1);
+    });
+}
+
+/// The device answers the newer request; its heartbeat reports the cancel.
+#[test]
+fn request_of_the_user_does_not_wait_for_a_cancel() {
+    on_bench(None, |bench| {
+        bench.open();
+        let before = bench.client.scene().epoch;
+        bench.cancel_change(1);
+        let clutch = Request::Clutch {
+            hold: ClutchMode::WithHand,
+        };
+        bench.client.enqueue(HostRequest::Request(clutch));
+        bench.advance(ms(10)).expect("in time");
+        let sent = bench.drain_sent();
+        assert!(
+            sent.iter().any(|sent| sent.starts_with("2 Clutch")),
+            "{sent:?}"
+        );
+        let (number, result) = (1, Ok(()));
+        bench.deliver(&ToHost::Answer(Answer { number, result }));
+        assert_eq!(bench.cancelled, 0);
+        bench.report_scene(before);
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (1, before));
+        bench.advance(ms(500)).expect("in time");
+        let sent = bench.drain_sent();
+        assert!(
+            !sent.iter().any(|sent| sent.contains("CancelChange")),
+            "{sent:?}"
+        );
+        assert_eq!(bench.unanswered, []);
+    });
+}
+
+#[test]
+fn withheld_tiles_of_another_scene_are_not_sent() {
+    on_bench(Some(Arming::VIRTUAL), |bench| {
+        bench.open();
+        let (epoch, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
+        bench.deliver(&ToHost::TileRequest { epoch, key });
+        bench.accept_change(1, 6_001);
+        let (number, result) = (1, Ok(()));
+        bench.deliver(&ToHost::Answer(Answer { number, result }));
+        assert_eq!(bench.drain_sent(), ["2 Arm"]);
+    });
 }

@@ -8,7 +8,7 @@ use hapterra_core::scene::{Scene, SceneChange};
 use hapterra_core::wire::hello::{DeviceHello, HostHello, PROTOCOL};
 use hapterra_core::wire::materials::{MAX_TABLE_BYTES, MaterialScene, table_bytes};
 use hapterra_core::wire::message::{ToDevice, ToHost};
-use hapterra_core::wire::request::Answer;
+use hapterra_core::wire::request::{Answer, Request};
 use hapterra_core::wire::session::{InSession, SessionEnd, SessionNumber};
 use hapterra_core::wire::version::VersionCheck;
 
@@ -46,8 +46,8 @@ pub(super) enum ProtocolEvent {
     },
     /// The scene is in force.
     SceneAck,
-    /// The scene change was answered: it is in force if the device's scene has its epoch.
-    SceneChange,
+    /// The scene change was answered.
+    SceneChange { accepted: bool },
     /// This message answers the request.
     Answered(HostRequest, ToHost),
     /// A message that the protocol itself does not consume.
@@ -71,6 +71,12 @@ pub(super) struct HostProtocol {
     materials: Option<MaterialTable>,
     /// The unanswered scene change, and the times when it was first and last sent.
     view: Option<(SceneChange, Duration, Duration)>,
+    /// The scene before a change in contact, which the device has again after a cancel, and the
+    /// change's number; until the change is rendered.
+    before: Option<(Scene, u8)>,
+    /// True if the scene before a change was restored since the last call of
+    /// [`HostProtocol::take_restored`].
+    is_restored: bool,
     timeouts: Timeouts,
     state: State,
     /// The time when the state began, and when its message was last sent.
@@ -104,6 +110,8 @@ impl HostProtocol {
             scene,
             materials: None,
             view: None,
+            before: None,
+            is_restored: false,
             timeouts,
             state: State::Closed,
             since: Duration::ZERO,
@@ -197,6 +205,8 @@ impl HostProtocol {
     /// Sends a scene change until it is answered; it replaces an unanswered one.
     pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
+        self.before = None;
+        self.requests.drop_cancels();
         if self.state == State::Open {
             self.append_message(&ToDevice::SceneChange(view), out);
         }
@@ -225,8 +235,46 @@ impl HostProtocol {
         if let Some((view, _, _)) = self.view.take()
             && epoch == Some(view.scene.epoch)
         {
-            self.scene = Some(view.scene);
+            self.accept_view(&view);
         }
+    }
+
+    fn accept_view(&mut self, view: &SceneChange) {
+        let before = self.scene.replace(view.scene);
+        // Equal scenes have equal epochs: a report of the epoch then does not mean a cancel.
+        let is_before =
+            |before: &Scene| view.in_contact.is_some() && before.epoch != view.scene.epoch;
+        self.before = before.filter(is_before).map(|scene| (scene, view.number));
+    }
+
+    /// Records that the device renders the placement with this number. Returns true if it is that
+    /// of the latest change, which can no longer be cancelled.
+    pub(super) fn on_rendered(&mut self, number: u8) -> bool {
+        let change = self.before.take_if(|(_, change)| *change == number);
+        change.is_some()
+    }
+
+    /// Returns to the scene before the latest change if the device reports that scene's epoch.
+    fn restore_reported_scene(&mut self, epoch: Option<u32>) {
+        if let Some((before, _)) = &self.before
+            && epoch == Some(before.epoch)
+        {
+            self.restore_scene();
+        }
+    }
+
+    /// Returns to the scene before the latest change.
+    fn restore_scene(&mut self) {
+        if let Some((before, _)) = self.before.take() {
+            self.scene = Some(before);
+            self.is_restored = true;
+            self.requests.drop_cancels();
+        }
+    }
+
+    /// Returns true if the scene before a change was restored since the last call.
+    pub(super) const fn take_restored(&mut self) -> bool {
+        std::mem::replace(&mut self.is_restored, false)
     }
 
     /// Returns the requested scene.
@@ -516,6 +564,7 @@ impl HostProtocol {
         // A new session, or a restarted device: the epoch of its scene shows whether the scene
         // change is in force.
         self.resolve_view(device.epoch);
+        self.restore_reported_scene(device.epoch);
         let restarted = !is_first;
         if self.is_ending() {
             return Ok(Some(ProtocolEvent::HelloReceived { device, restarted }));
@@ -553,9 +602,9 @@ impl HostProtocol {
         {
             self.received = now;
             if accepted {
-                self.scene = Some(view.scene);
+                self.accept_view(&view);
             }
-            return Ok(Some(ProtocolEvent::SceneChange));
+            return Ok(Some(ProtocolEvent::SceneChange { accepted }));
         }
         if self.state != State::SceneSent || self.lacks_scene(Some(epoch)) {
             return Ok(None);
@@ -571,6 +620,13 @@ impl HostProtocol {
     fn on_answer(&mut self, now: Duration, number: u8, message: ToHost) -> Option<ProtocolEvent> {
         let request = self.requests.request_answered(number)?;
         self.received = now;
+        if let (HostRequest::Request(Request::CancelChange { epoch }), ToHost::Answer(answer)) =
+            (&request, &message)
+            && answer.result.is_ok()
+            && self.scene.is_some_and(|scene| scene.epoch == *epoch)
+        {
+            self.restore_scene();
+        }
         Some(ProtocolEvent::Answered(request, message))
     }
 
@@ -587,6 +643,9 @@ impl HostProtocol {
 
     fn on_heartbeat(&mut self, now: Duration, message: &ToHost, out: &mut Vec<u8>) {
         self.received = now;
+        if let ToHost::Heartbeat { epoch, .. } = message {
+            self.restore_reported_scene(*epoch);
+        }
         if let ToHost::Heartbeat { epoch, .. } = message
             && self.state == State::Open
             && self.lacks_scene(*epoch)

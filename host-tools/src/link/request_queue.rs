@@ -32,9 +32,19 @@ pub(super) struct RequestQueue {
 }
 
 impl RequestQueue {
-    /// Adds a request at the end of the queue.
+    /// Adds a request at the end of the queue. Cancels of a change give up their place to any other
+    /// request: heartbeats report their result.
     pub(super) fn enqueue(&mut self, request: HostRequest) {
+        if !is_cancel(&request) {
+            self.drop_cancels();
+        }
         self.waiting.push_back(request);
+    }
+
+    /// Removes the cancels of a change, pending or waiting. A late answer to one is ignored.
+    pub(super) fn drop_cancels(&mut self) {
+        self.pending.take_if(|pending| is_cancel(&pending.request));
+        self.waiting.retain(|request| !is_cancel(request));
     }
 
     /// Begins a session: numbers start again, and the requests of the session before are given up.
@@ -134,4 +144,9 @@ impl RequestQueue {
             .take_if(is_match)
             .map(|pending| pending.request)
     }
+}
+
+/// Returns true if a request cancels a change of placement.
+const fn is_cancel(request: &HostRequest) -> bool {
+    matches!(request, HostRequest::Request(Request::CancelChange { .. }))
 }

@@ -3,7 +3,7 @@
 
 use hapterra_core::force::SurfaceParams;
 
-use super::placement::{Placement, finest_level};
+use super::placement::{Placement, coarsest_level, finest_level};
 use super::surface_change::{SurfaceChange, SurfaceError};
 use crate::terrain::{HapticGrid, ScaleError, Terrain, TerrainError};
 
@@ -120,6 +120,17 @@ pub struct Bounds {
     pub level: Option<u8>,
     /// Initial radius of the ball at the tip, device millimetres; 0 for a point.
     pub tip_mm: f64,
+    /// Levels above the finest one, without a stated level.
+    pub coarser: u8,
+}
+
+/// Measurement of the haptic cells at the place under the hand, when a placement changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// The cells are measured again, if they differ there.
+    Again,
+    /// The cells stay, for a change of the level alone.
+    Keep,
 }
 
 /// The HIP and the proxy, device millimetres of the current placement. The placement changes about
@@ -170,7 +181,8 @@ pub struct Changed<'r> {
 }
 
 impl Bounds {
-    /// Applies changes in order, at the place under the hand. The cells are then measured there.
+    /// Applies changes in order, at the place under the hand, where the cells are then measured
+    /// again if `measure` requests it.
     ///
     /// # Errors
     /// [`ChangeError`] of the first invalid change; then nothing is changed.
@@ -179,7 +191,7 @@ impl Bounds {
         terrain: &Terrain<'r>,
         before: &PlacedSurface,
         changes: &[PlacementChange],
-        hand: &Hand,
+        (hand, measure): (&Hand, Measure),
     ) -> Result<Changed<'r>, ChangeError> {
         let at_mm = hand.at_mm();
         let cell_mm = before.view.scale.cell_mm();
@@ -189,14 +201,20 @@ impl Bounds {
         for change in changes {
             (placed_surface, at) = self.step(&mut grid, placed_surface, at, change)?;
         }
-        if let Some(remeasured) = grid.remeasured_at(at) {
+        if measure == Measure::Again
+            && let Some(remeasured) = grid.remeasured_at(at)
+        {
             at = remeasured.of_ground(grid.to_ground(at));
             placed_surface.view = placed_surface.view.measured_as(&remeasured)?;
             grid = remeasured;
         }
         placed_surface.view.level = match self.level {
             Some(level) => level,
-            None => finest_level(&grid, self.resolution_mm, &placed_surface.view.scale),
+            None => {
+                let finest = self.finest_level(&grid, &placed_surface.view);
+                let last = coarsest_level(&grid).max(finest);
+                finest.saturating_add(self.coarser).min(last)
+            }
         };
         let terrain_after =
             terrain.with_grid(grid, placed_surface.view.scale, placed_surface.view.level)?;
@@ -213,6 +231,12 @@ impl Bounds {
             terrain: terrain_after,
             hip_mm,
         })
+    }
+
+    /// Returns the finest level of a placement that the encoders resolve.
+    #[must_use]
+    pub fn finest_level(&self, grid: &HapticGrid<'_>, view: &Placement) -> u8 {
+        finest_level(grid, self.resolution_mm, &view.scale)
     }
 
     /// Applies one change, at a place in haptic cells of level 0.

@@ -47,6 +47,7 @@ impl Bench {
             resolution_mm: reach.resolution_mm(),
             level: self.level,
             tip_mm: 0.0,
+            coarser: 0,
         };
         check(&terrain, bounds)
     }
@@ -68,7 +69,7 @@ fn zoom_keeps_ground_under_proxy_and_hip_depth() {
         let before = bounds.first;
         let zoom = [PlacementChange::Zoom(8.0)];
         let changed = bounds
-            .apply(terrain, &before, &zoom, &hand)
+            .apply(terrain, &before, &zoom, (&hand, Measure::Again))
             .expect("zoomed");
         let view = changed.placed_surface.view;
         assert!((view.scale.cell_mm() - 0.4).abs() < 1e-12);
@@ -111,7 +112,7 @@ fn level_follows_the_scale_unless_it_is_stated() {
             let hand = pressing(terrain);
             let level = |factor: f64| {
                 let zoom = [PlacementChange::Zoom(factor)];
-                let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
+                let changed = bounds.apply(terrain, &bounds.first, &zoom, (&hand, Measure::Again));
                 changed.expect("zoomed").placed_surface.view.level
             };
             // One count is 0.029 mm.
@@ -124,7 +125,7 @@ fn level_follows_the_scale_unless_it_is_stated() {
 fn pan_keeps_hip_depth_and_is_refused_outside_terrain() {
     Bench::new().with(|terrain, bounds| {
         let hand = pressing(terrain);
-        let pan = |change| bounds.apply(terrain, &bounds.first, &[change], &hand);
+        let pan = |change| bounds.apply(terrain, &bounds.first, &[change], (&hand, Measure::Again));
         let panned = pan(PlacementChange::Pan {
             east_mm: 5.0,
             north_mm: -1.0,
@@ -158,7 +159,7 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
             PlacementChange::Exaggerate(3.0),
             PlacementChange::Stiffness(0.5),
         ];
-        let changed = bounds.apply(terrain, &bounds.first, &steeper, &hand);
+        let changed = bounds.apply(terrain, &bounds.first, &steeper, (&hand, Measure::Again));
         let changed = changed.expect("changed");
         let PlacedSurface { view, params } = changed.placed_surface;
         assert!((view.exaggeration.expect("known") - 3.0).abs() < 1e-9);
@@ -169,7 +170,12 @@ fn exaggeration_and_stiffness_changes_are_undone_by_reset() {
             proxy_mm: None,
         };
         let back = [PlacementChange::Reset];
-        let back = bounds.apply(&changed.terrain, &changed.placed_surface, &back, &there);
+        let back = bounds.apply(
+            &changed.terrain,
+            &changed.placed_surface,
+            &back,
+            (&there, Measure::Again),
+        );
         let back = back.expect("back").placed_surface;
         assert_eq!(
             (back.view.scale, back.params),
@@ -193,7 +199,7 @@ fn refused_placement_change_names_the_bound() {
             (PlacementChange::Stiffness(3.0), "1 N/mm"),
             (PlacementChange::Stiffness(1e-4), "0.005"),
         ] {
-            let refused = bounds.apply(terrain, &bounds.first, &[change], &hand);
+            let refused = bounds.apply(terrain, &bounds.first, &[change], (&hand, Measure::Again));
             let message = refused.err().expect("refused").to_string();
             assert!(message.contains(expected), "{change:?}: {message}");
         }
@@ -205,7 +211,11 @@ fn refused_placement_change_names_the_bound() {
         let mut first = bounds.first;
         first.view = first.view.scaled(80.0, 8.0).expect("a scale");
         let smaller = [PlacementChange::Zoom(0.9)];
-        assert!(bounds.apply(terrain, &first, &smaller, &hand).is_ok());
+        assert!(
+            bounds
+                .apply(terrain, &first, &smaller, (&hand, Measure::Again))
+                .is_ok()
+        );
     });
 }
 
@@ -218,7 +228,7 @@ fn zoom_in_air_keeps_height_above_surface() {
             proxy_mm: None,
         };
         let zoom = [PlacementChange::Zoom(4.0)];
-        let changed = bounds.apply(terrain, &bounds.first, &zoom, &hand);
+        let changed = bounds.apply(terrain, &bounds.first, &zoom, (&hand, Measure::Again));
         let changed = changed.expect("zoomed");
         let [x, y, z] = changed.hip_mm;
         let ground = changed.terrain.height_mm(x, y).expect("ground");
@@ -242,7 +252,7 @@ fn pending_ground_is_not_reported_as_available() {
         };
         let zoom = [PlacementChange::Zoom(2.0)];
         let changed = || {
-            let changed = bounds.apply(&terrain, &bounds.first, &zoom, &hand);
+            let changed = bounds.apply(&terrain, &bounds.first, &zoom, (&hand, Measure::Again));
             changed.expect("zoomed")
         };
         let first = changed();

@@ -18,8 +18,8 @@ mod surface_change;
 mod target;
 
 pub use change::{
-    Bounds, ChangeError, Changed, Hand, MAX_STIFFNESS_N_PER_MM, PlacedSurface, PlacementChange,
-    TIPS_MM,
+    Bounds, ChangeError, Changed, Hand, MAX_STIFFNESS_N_PER_MM, Measure, PlacedSurface,
+    PlacementChange, TIPS_MM,
 };
 pub use coordinates::Coordinates;
 pub use error::PlaceError;

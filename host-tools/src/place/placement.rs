@@ -389,11 +389,16 @@ impl<'g> CheckedRequest<'g> {
 /// Returns the finest level whose cells are not finer than a count of the encoders, and in which
 /// the tip's radius is at most [`MAX_TIP_CELLS`], or the coarsest level with a patch.
 pub(super) fn finest_level(grid: &HapticGrid<'_>, resolution_mm: f64, scale: &Scale) -> u8 {
-    let fewest = grid.columns().min(grid.rows()) - 1;
-    let last = fewest.max(1).ilog2() as u8;
+    let last = coarsest_level(grid);
     let min_mm = resolution_mm.max(grid.tip_mm() / MAX_TIP_CELLS);
     let fine = |level: &u8| scale.at_level(*level).cell_mm() < min_mm;
     (0..last).find(|level| !fine(level)).unwrap_or(last)
+}
+
+/// Returns the coarsest level with a patch.
+pub(super) fn coarsest_level(grid: &HapticGrid<'_>) -> u8 {
+    let fewest = grid.columns().min(grid.rows()) - 1;
+    fewest.max(1).ilog2() as u8
 }
 
 fn sorted([a, b]: [f64; 2]) -> [f64; 2] {

@@ -1,5 +1,7 @@
 //! Changes of the placement by the user, applied to a device.
 
+mod automatic_level;
+
 use std::time::{Duration, Instant};
 
 use hapterra_core::clutch::ClutchMode;
@@ -10,9 +12,10 @@ use hapterra_core::scene::{ContactMap, SceneChange, Source, TickRecord};
 use hapterra_core::terrain::TileIndex;
 use hapterra_core::wire::request::Request;
 
+use self::automatic_level::AutomaticLevel;
 use super::Steer;
 use crate::link::{Event, HostRequest};
-use crate::place::{Bounds, Changed, Hand, PlacedSurface, PlacementChange};
+use crate::place::{Bounds, Changed, Hand, Measure, PlacedSurface, PlacementChange};
 use crate::terrain::Terrain;
 
 /// Maximum number of changes that wait for the clutch to open; they are then applied together.
@@ -53,6 +56,18 @@ pub struct PlacementUpdate<'r> {
     /// The place about which the placement changes, device millimetres of the new one.
     /// `None` if its height is unknown.
     place_mm: Option<[f64; 3]>,
+}
+
+/// Placement computed for the pressing hand.
+enum InContact<'r> {
+    /// It can change in contact.
+    Ready(Box<PlacementUpdate<'r>>),
+    /// Its ground has not been read yet.
+    Waits,
+    /// It changes with an open clutch.
+    NeedsClutch,
+    /// The changes are impossible, for this reason.
+    Impossible(String),
 }
 
 /// Stage of a change.
@@ -101,6 +116,8 @@ pub struct Steering<'r> {
     /// Samples since the force began to turn to that of the current placement.
     turning: u32,
     stage: Stage<'r>,
+    /// Changes of the level by the hand's speed, if the user has chosen them.
+    automatic: Option<AutomaticLevel<'r>>,
     requests: Vec<HostRequest>,
     update: Option<PlacementUpdate<'r>>,
     lines: Vec<String>,
@@ -124,6 +141,7 @@ impl<'r> Steering<'r> {
             without_ground: 0,
             turning: 0,
             stage: Stage::Idle,
+            automatic: None,
             requests: vec![],
             update: None,
             lines: vec![],
@@ -147,6 +165,7 @@ impl<'r> Steering<'r> {
     pub const fn is_settled(&self) -> bool {
         let is_at_rest = match self.stage {
             Stage::Idle => !self.held,
+            Stage::Applying { .. } | Stage::InContact { .. } if self.changes_level() => !self.held,
             Stage::Open => self.held,
             _ => false,
         };
@@ -188,7 +207,9 @@ impl<'r> Steering<'r> {
             Event::SceneChangeResult { view, accepted } => {
                 self.on_scene_change_result(view, *accepted);
             }
-            Event::Opened { resumed, .. } => {
+            Event::ChangeCancelled => self.on_change_cancelled(),
+            Event::Opened { resumed, device } => {
+                self.on_level_session(*resumed, device.tick_hz);
                 // A session's end releases its clutch, and a restarted device starts with this
                 // placement.
                 self.requested_hold = ClutchMode::Released;
@@ -211,6 +232,13 @@ impl<'r> Steering<'r> {
                     *answered = true;
                 }
             }
+            Event::Unanswered(HostRequest::Request(Request::CancelChange { .. })) => {
+                self.on_unanswered_cancel();
+            }
+            Event::Answered {
+                request: Request::CancelChange { epoch },
+                result: Err(refusal),
+            } => self.on_refused_cancel(*epoch, refusal),
             Event::Unanswered(HostRequest::Request(Request::Clutch { .. })) => {
                 self.give_up("the device does not answer: no further change is made");
             }
@@ -222,7 +250,13 @@ impl<'r> Steering<'r> {
         self.lines.push(why.to_owned());
         self.waiting.clear();
         (self.held, self.must_measure) = (false, false);
+        if matches!(self.stage, Stage::Applying { .. }) {
+            // The answer to the change is still to arrive.
+            return self.request_clutch(ClutchMode::Released);
+        }
         self.release_clutch();
+        // Behind the clutch, which replaces earlier cancels in the queue.
+        self.request_cancel();
     }
 
     fn request_clutch(&mut self, hold: ClutchMode) {
@@ -248,6 +282,13 @@ impl<'r> Steering<'r> {
         };
     }
 
+    /// Waits for the clutch if the user has taken it while a change was sent.
+    fn continue_clutch(&mut self) {
+        if self.requested_hold != ClutchMode::Released {
+            self.open_clutch();
+        }
+    }
+
     fn release_clutch(&mut self) {
         self.request_clutch(ClutchMode::Released);
         self.stage = Stage::Closing;
@@ -257,6 +298,7 @@ impl<'r> Steering<'r> {
         let is_open = sample.limits.contains(Limits::CLUTCH_OPEN);
         let by_input = sample.limits.contains(Limits::CLUTCH_INPUT);
         let is_held_by_input = by_input && is_open;
+        self.follow_hand(sample);
         if matches!(self.stage, Stage::InContact { .. }) && sample.view == self.number {
             self.stage = Stage::Idle;
         }
@@ -272,6 +314,11 @@ impl<'r> Steering<'r> {
         if self.held && self.requested_hold == ClutchMode::InPlace {
             self.hold_clutch();
         }
+        // The user does not wait for the device's answer to a change of the level.
+        let applies_level = matches!(self.stage, Stage::Applying { .. }) && self.changes_level();
+        if self.held && applies_level && self.requested_hold == ClutchMode::Released {
+            self.hold_clutch();
+        }
         let is_turning = sample.limits.contains(Limits::CLUTCH_MOVES) && !by_input;
         let is_idle = matches!(self.stage, Stage::Idle) && !self.held;
         if is_idle && (self.waits_for_turn(is_turning) || self.changes_in_contact(sample)) {
@@ -283,9 +330,13 @@ impl<'r> Steering<'r> {
             Stage::Idle if self.held || self.must_measure || !self.waiting.is_empty() => {
                 self.open_clutch();
             }
+            Stage::Idle => self.change_level(sample),
             Stage::InContact { samples } => {
                 *samples += 1;
-                if self.held || !presses(sample) || *samples > MAX_SAMPLES_IN_CONTACT {
+                let samples = *samples;
+                if self.changes_level() {
+                    self.wait_for_level(sample, samples);
+                } else if self.held || !presses(sample) || samples > MAX_SAMPLES_IN_CONTACT {
                     self.open_clutch();
                 }
             }
@@ -301,7 +352,12 @@ impl<'r> Steering<'r> {
             }
             Stage::Open if sample.view == self.number => self.advance(sample),
             // The board's clutch input may still hold the clutch open.
-            Stage::Closing if !is_open || by_input => self.stage = Stage::Idle,
+            Stage::Closing if !is_open || by_input => {
+                self.stage = match self.changes_level() {
+                    true => Stage::InContact { samples: 0 },
+                    false => Stage::Idle,
+                };
+            }
             _ => {}
         }
     }
@@ -335,7 +391,11 @@ impl<'r> Steering<'r> {
             .waiting_since
             .get_or_insert_with(Instant::now)
             .elapsed();
-        let next = self.next_view(&changes, sample, waited < MAX_GROUND_WAIT);
+        let next = self.next_view(
+            (&self.bounds, Measure::Again),
+            &changes,
+            (sample, waited < MAX_GROUND_WAIT),
+        );
         if let Ok(None) = next {
             (self.waiting, self.must_measure) = (changes, must_measure);
             return;
@@ -366,11 +426,11 @@ impl<'r> Steering<'r> {
     }
 
     /// Sends the changes that wait, if they can be made under the pressing hand, or waits for its
-    /// new ground. Impossible changes are refused. Returns false if the clutch has to be opened for them.
+    /// new ground. Impossible changes are refused. Returns false if the clutch has to be opened for
+    /// them.
     fn changes_in_contact(&mut self, sample: &TickRecord) -> bool {
         let is_free = !self.held && !self.must_measure && !self.waiting.is_empty();
-        let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
-        if !is_free || !is_current || !presses(sample) {
+        if !is_free || !self.may_change_in_contact(sample) {
             return false;
         }
         self.without_ground += 1;
@@ -379,18 +439,44 @@ impl<'r> Steering<'r> {
             // The proxy is on another surface than the ground that the change is computed from.
             return waits;
         }
-        let mut update = match self.next_view(&self.waiting, sample, true) {
-            Ok(Some(update)) => update,
-            Ok(None) => return waits,
-            Err(why) => {
+        match self.update_in_contact((&self.bounds, Measure::Again), &self.waiting, sample) {
+            InContact::Ready(update) => {
+                let changes = std::mem::take(&mut self.waiting);
+                self.without_ground = 0;
+                self.apply(*update, Some(changes));
+                true
+            }
+            InContact::Waits => waits,
+            InContact::NeedsClutch => false,
+            InContact::Impossible(why) => {
                 self.waiting.clear();
                 self.without_ground = 0;
                 self.refuse(&why);
-                return true;
+                true
             }
+        }
+    }
+
+    /// Returns true if the hand presses on the current placement with the full force.
+    fn may_change_in_contact(&self, sample: &TickRecord) -> bool {
+        let is_current = sample.view == self.number && !sample.limits.intersects(NOT_IN_CONTACT);
+        is_current && presses(sample)
+    }
+
+    /// Returns the changed placement for the pressing hand.
+    fn update_in_contact(
+        &self,
+        (bounds, measure): (&Bounds, Measure),
+        changes: &[PlacementChange],
+        sample: &TickRecord,
+    ) -> InContact<'r> {
+        let mut update = match self.next_view((bounds, measure), changes, (sample, true)) {
+            Ok(Some(update)) => update,
+            Ok(None) => return InContact::Waits,
+            Err(why) => return InContact::Impossible(why),
         };
         let Some(in_contact) = self.contact_map(&update, sample) else {
-            return false;
+            return InContact::NeedsClutch;
         };
         let (view, reach_mm) = (&mut update.view, update.placed_surface.view.reach_mm);
         let touched = in_contact.to.column();
@@ -402,13 +488,10 @@ impl<'r> Steering<'r> {
             .with_fallback_around(view.scene, reach_mm, touched);
         let may_turn = view.may_turn_from(&self.now.params);
         if !may_turn || view.scene.fallback.is_none() || view.scene.materials.is_some() {
-            return false;
+            return InContact::NeedsClutch;
         }
         view.in_contact = Some(in_contact);
-        let changes = std::mem::take(&mut self.waiting);
-        self.without_ground = 0;
-        self.apply(update, Some(changes));
-        true
+        InContact::Ready(Box::new(update))
     }
 
     /// Returns the map of the proxy to the new placement.
@@ -444,12 +527,12 @@ impl<'r> Steering<'r> {
     /// `waits` is true.
     fn next_view(
         &self,
+        (bounds, measure): (&Bounds, Measure),
         changes: &[PlacementChange],
-        sample: &TickRecord,
-        waits: bool,
+        (sample, waits): (&TickRecord, bool),
     ) -> Result<Option<PlacementUpdate<'r>>, String> {
         let hand = self.hand(sample);
-        let changed = self.bounds.apply(&self.terrain, &self.now, changes, &hand);
+        let changed = bounds.apply(&self.terrain, &self.now, changes, (&hand, measure));
         let Changed {
             placed_surface,
             terrain,
@@ -489,11 +572,18 @@ impl<'r> Steering<'r> {
         };
         match in_contact {
             _ if accepted => {
+                self.on_level_result(true);
                 self.number = view.number;
                 (self.now, self.terrain) = *next;
                 if in_contact.is_some() {
                     self.stage = Stage::InContact { samples: 0 };
+                    self.continue_clutch();
                 }
+            }
+            Some(_) if self.changes_level() => {
+                self.stage = Stage::Idle;
+                self.on_level_result(false);
+                self.continue_clutch();
             }
             Some(changes) => {
                 self.waiting.splice(..0, changes);

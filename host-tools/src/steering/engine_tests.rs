@@ -1,5 +1,8 @@
 //! Tests of the engine with devices that misbehave or restart.
 
+#[path = "engine/automatic_level_tests.rs"]
+mod automatic_level;
+
 use super::*;
 use crate::link::hello;
 use crate::place::{Placement, PlacementOptions, Reach, Sizing};
@@ -34,6 +37,7 @@ fn with_raster<T>(raster: &Raster, test: impl FnOnce(&mut Steering<'_>) -> T) ->
         resolution_mm: reach.resolution_mm(),
         level: None,
         tip_mm: 0.0,
+        coarser: 0,
     };
     test(&mut Steering::new(bounds, terrain.clone()))
 }

@@ -16,6 +16,7 @@
 pub mod command;
 mod engine;
 pub mod keys;
+mod level_by_speed;
 mod marks;
 mod queue;
 

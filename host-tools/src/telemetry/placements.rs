@@ -51,10 +51,13 @@ impl<'t> Placements<'t> {
     /// Processes an event of the device.
     pub fn on_event(&mut self, event: &Event<'_>) {
         match event {
-            // A placement that was not accepted has no samples.
+            // A placement that was not accepted, or was cancelled, has no samples.
             Event::SceneChangeResult {
                 accepted: false, ..
-            } if self.views.len() > 1 => {
+            }
+            | Event::ChangeCancelled
+                if self.views.len() > 1 =>
+            {
                 self.views.pop();
             }
             // A restarted device begins with the latest placement as its scene.

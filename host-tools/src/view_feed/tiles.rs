@@ -55,6 +55,7 @@ impl Tiles {
                 requested.push(*key);
             }
             (Event::TileSent(key), None) => self.sent(*key),
+            (Event::ChangeCancelled, _) => self.requested = None,
             (Event::Opened { resumed: false, .. }, _) => self.forget(),
             _ => {}
         }

@@ -1,6 +1,8 @@
 //! A change of the placement while a hand presses: the device's own application, a virtual Phantom,
 //! and the engine behind keys and commands.
 
+mod level_by_speed;
+
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
@@ -64,6 +66,8 @@ struct Touching<'t> {
     steering: Steering<'t>,
     samples: Vec<TickRecord>,
     messages: Vec<String>,
+    /// Ticks after which a change was cancelled.
+    cancelled: Vec<u32>,
     /// True if the board's clutch input is held.
     pedal: Rc<Cell<bool>>,
 }
@@ -116,6 +120,20 @@ fn pressed_on<T>(
     seconds: f64,
     play: impl FnOnce(&mut Touching<'_>) -> T,
 ) -> T {
+    let press = |touch: Touch<'_>, _| touch.press(PUSH_N, seconds).finish();
+    let arm = (model, RESOLUTION_MM, params, tip_mm);
+    touched_at(arm, raster, options, press, play)
+}
+
+/// As [`pressed_on`], with these encoders (resolution in mm): `touch` continues the plan of a hand
+/// over the home position, given in device millimetres.
+fn touched_at<T>(
+    (model, resolution_mm, params, tip_mm): (PhantomModel, f64, SurfaceParams, f64),
+    raster: &Raster,
+    options: &PlacementOptions,
+    touch: impl FnOnce(Touch<'_>, [f64; 2]) -> Script,
+    play: impl FnOnce(&mut Touching<'_>) -> T,
+) -> T {
     let grid = options.target.grid(raster, HapticCells::default());
     let grid = grid.expect("a grid").with_tip(tip_mm);
     let reach = Reach::of(&Calibration::PREMIUM_1_5);
@@ -125,8 +143,8 @@ fn pressed_on<T>(
     let [east, north, _] = view.home_mm;
     let surface = |x: f64, y: f64| terrain.height_mm(x, y);
     let (hand, wall) = (HandModel::default(), f64::from(params.stiffness_n_per_mm));
-    let touch = Touch::start(&surface, &hand, wall, [east, north], 10.0);
-    let script: Script = touch.press(PUSH_N, seconds).finish();
+    let start = Touch::start(&surface, &hand, wall, [east, north], 10.0);
+    let script = touch(start, [east, north]);
     let home_mm = view.home_mm;
     let arm = HeldPhantom::new(model, hand, ArmFrame { home_mm }, script).expect("in reach");
     let pedal = Rc::new(Cell::new(false));
@@ -137,15 +155,17 @@ fn pressed_on<T>(
     let opened = Session::open(&terrain, scene, arming, Box::new(device), timeout);
     let bounds = Bounds {
         first: PlacedSurface { view, params },
-        resolution_mm: RESOLUTION_MM,
+        resolution_mm,
         level: None,
         tip_mm,
+        coarser: 0,
     };
     let mut touching = Touching {
         session: opened.expect("opened").0,
         steering: Steering::new(bounds, terrain.clone()),
         samples: vec![],
         messages: vec![],
+        cancelled: vec![],
         pedal,
     };
     // Armed, lowered, and at rest.
@@ -160,10 +180,15 @@ fn pressed_on<T>(
 impl Touching<'_> {
     fn poll(&mut self) {
         let (samples, steering) = (&mut self.samples, &mut self.steering);
+        let cancelled = &mut self.cancelled;
         let mut on_event = |event: Event<'_>| {
             steering.on_event(&event);
-            if let Event::Sample(sample) = event {
-                samples.push(*sample);
+            match event {
+                Event::Sample(sample) => samples.push(*sample),
+                Event::ChangeCancelled => {
+                    cancelled.push(samples.last().map_or(0, |last| last.tick));
+                }
+                _ => {}
             }
         };
         self.session

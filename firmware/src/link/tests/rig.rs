@@ -338,6 +338,15 @@ impl Rig {
         self.received.iter().filter_map(telemetry).collect()
     }
 
+    /// Returns the latest reported sample.
+    pub(super) fn latest(&self) -> TickRecord {
+        let reported = self.telemetry();
+        let last = reported
+            .last()
+            .and_then(|telemetry| telemetry.samples.last());
+        *last.expect("samples")
+    }
+
     /// Returns the last report of the guard.
     pub(super) fn report(&self) -> Option<Report> {
         let guard = |m: &ToHost| match m {

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use hapterra_core::clutch::ClutchMode;
 use hapterra_core::grid::GridPoint;
 use hapterra_core::guard::{Limits, Mode};
-use hapterra_core::scene::{Scene, SceneChange, Source, TickRecord};
+use hapterra_core::scene::{Scene, SceneChange, Source};
 use hapterra_core::wire::message::{ToDevice, ToHost};
 use hapterra_core::wire::request::Request;
 
@@ -27,15 +27,6 @@ fn view(number: u8, hip: GridPoint) -> SceneChange {
     }
 }
 
-/// Returns the latest reported sample.
-fn latest(rig: &Rig) -> TickRecord {
-    let reported = rig.telemetry();
-    let last = reported
-        .last()
-        .and_then(|telemetry| telemetry.samples.last());
-    *last.expect("samples")
-}
-
 /// Returns the outcomes of scene changes, in the order of the answers, from the first.
 fn scene_answers(rig: &Rig) -> Vec<(u32, bool)> {
     let answer = |message: &ToHost| match message {
@@ -52,14 +43,14 @@ fn with_an_open_clutch() -> Rig {
     });
     rig.run(150);
     assert_eq!(rig.answers(TO_CLUTCH), [Ok(())]);
-    assert!(latest(&rig).limits.contains(Limits::CLUTCH_OPEN));
+    assert!(rig.latest().limits.contains(Limits::CLUTCH_OPEN));
     rig
 }
 
 #[test]
 fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     let mut rig = with_an_open_clutch();
-    let wanted = view(1, latest(&rig).hip);
+    let wanted = view(1, rig.latest().hip);
     rig.received
         .retain(|message| !matches!(message, ToHost::TileRequest { .. }));
     rig.send_message(&ToDevice::SceneChange(wanted));
@@ -69,7 +60,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
         !rig.tile_requests().is_empty(),
         "its own tiles are requested"
     );
-    assert_eq!((latest(&rig).view, latest(&rig).mode), (1, Mode::Armed));
+    assert_eq!((rig.latest().view, rig.latest().mode), (1, Mode::Armed));
     // Repeated, because the answer was lost.
     rig.send_message(&ToDevice::SceneChange(wanted));
     rig.run(10);
@@ -78,7 +69,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
         hold: ClutchMode::Released,
     });
     rig.run(600);
-    let sample = latest(&rig);
+    let sample = rig.latest();
     assert_eq!((sample.view, sample.mode), (1, Mode::Armed));
     assert_eq!(sample.limits, Limits::empty());
     assert_eq!(rig.status().device.epoch, Some(1_001));
@@ -86,7 +77,7 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
     rig.send_message(&ToDevice::SceneChange(wanted));
     rig.run(10);
     assert_eq!(scene_answers(&rig), [(1_001, true); 3]);
-    assert_eq!(latest(&rig).mode, Mode::Armed);
+    assert_eq!(rig.latest().mode, Mode::Armed);
     // An earlier one, late.
     rig.send_message(&ToDevice::SceneChange(view(0, sample.hip)));
     rig.send_message(&ToDevice::SceneChange(view(200, sample.hip)));
@@ -103,11 +94,11 @@ fn placement_change_with_open_clutch_keeps_the_arm_armed() {
 fn placement_during_contact_is_refused() {
     let mut rig = Rig::armed();
     rig.run(20);
-    let before = latest(&rig);
+    let before = rig.latest();
     rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(scene_answers(&rig), [(1_001, false)]);
-    assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
+    assert_eq!((rig.latest().view, rig.latest().mode), (0, Mode::Armed));
     // The clutch was held and then released: the change is still refused.
     let mut rig = with_an_open_clutch();
     rig.request(Request::Clutch {
@@ -116,7 +107,7 @@ fn placement_during_contact_is_refused() {
     rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(scene_answers(&rig), [(1_001, false)]);
-    assert_eq!(latest(&rig).mode, Mode::Armed);
+    assert_eq!(rig.latest().mode, Mode::Armed);
     // It is held, and has not opened yet.
     let mut rig = Rig::armed();
     rig.request(Request::Clutch {
@@ -126,7 +117,7 @@ fn placement_during_contact_is_refused() {
     rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
     rig.run(20);
     assert_eq!(scene_answers(&rig), [(1_001, false)]);
-    assert_eq!((latest(&rig).view, latest(&rig).mode), (0, Mode::Armed));
+    assert_eq!((rig.latest().view, rig.latest().mode), (0, Mode::Armed));
     // It is open, but the loop's last report is from the previous placement.
     let mut rig = with_an_open_clutch();
     rig.send_message(&ToDevice::SceneChange(view(1, before.hip)));
@@ -140,7 +131,7 @@ fn placement_during_contact_is_refused() {
     rig.send_message(&ToDevice::SceneChange(points));
     rig.run(20);
     assert_eq!(scene_answers(&rig), [(1_001, false)]);
-    assert_eq!(latest(&rig).mode, Mode::Armed);
+    assert_eq!(rig.latest().mode, Mode::Armed);
 }
 
 /// Safety: 15.
@@ -148,7 +139,7 @@ fn placement_during_contact_is_refused() {
 fn clutch_hold_ends_with_the_session_of_its_host() {
     let closed = |rig: &mut Rig| {
         rig.run(700);
-        latest(rig).limits == Limits::empty()
+        rig.latest().limits == Limits::empty()
     };
     let mut rig = with_an_open_clutch();
     assert!(!closed(&mut rig), "the host is there");
@@ -159,5 +150,5 @@ fn clutch_hold_ends_with_the_session_of_its_host() {
     rig.run(1_000);
     rig.open_new_session();
     assert!(closed(&mut rig), "a host that detached");
-    assert_eq!(latest(&rig).mode, Mode::Armed);
+    assert_eq!(rig.latest().mode, Mode::Armed);
 }

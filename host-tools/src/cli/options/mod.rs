@@ -5,6 +5,7 @@ pub mod device;
 pub mod events;
 pub mod exaggeration;
 pub mod input;
+pub mod level;
 pub mod placing;
 pub mod recording;
 pub mod rendering;

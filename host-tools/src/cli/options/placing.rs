@@ -74,7 +74,7 @@ impl Placing {
             target,
             sizing: MapScale::sizing(rendering.scale),
             heights: rendering.exaggeration.unwrap_or_default().into(),
-            level: rendering.level,
+            level: rendering.fixed_level(),
         }
     }
 }

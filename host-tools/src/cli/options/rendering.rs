@@ -1,6 +1,7 @@
 //! Options for the rendering of a terrain, shared by `replay`, `run`, `demo` and `view`.
 
 use super::exaggeration::Exaggeration;
+use super::level::LevelChoice;
 use super::scale::MapScale;
 use super::surface::SurfaceOptions;
 use crate::cli::failure::{Failure, OrHint};
@@ -32,11 +33,12 @@ pub struct Rendering {
     #[arg(long, value_name = "TIMES|auto", allow_hyphen_values = true)]
     pub exaggeration: Option<Exaggeration>,
 
-    /// Level of detail: every 2^LEVEL-th sample
+    /// Level of detail: every 2^LEVEL-th sample, or by-speed
     ///
-    /// [default: replay 0, else the finest that the encoders resolve]
-    #[arg(long)]
-    pub level: Option<u8>,
+    /// [default: replay 0, else the finest that the encoders resolve] by-speed: `run` and `demo`
+    /// begin at that level, and render a coarser one while the pressing hand is fast.
+    #[arg(long, value_name = "LEVEL|by-speed")]
+    pub level: Option<LevelChoice>,
 
     /// Radius of the ball at the tip, such as 2mm
     ///
@@ -52,6 +54,40 @@ pub struct Rendering {
 }
 
 impl Rendering {
+    /// Returns the stated level, if there is one.
+    #[must_use]
+    pub const fn fixed_level(&self) -> Option<u8> {
+        match self.level {
+            Some(LevelChoice::Fixed(level)) => Some(level),
+            Some(LevelChoice::BySpeed) | None => None,
+        }
+    }
+
+    /// Returns true if the level follows the hand's speed.
+    #[must_use]
+    pub fn is_level_by_speed(&self) -> bool {
+        self.level == Some(LevelChoice::BySpeed)
+    }
+
+    /// Checks that the level is a number, or the default, for a command without a hand.
+    ///
+    /// # Errors
+    /// The level follows the hand's speed.
+    pub fn check_level_without_hand(&self) -> Result<(), Failure> {
+        match self.is_level_by_speed() {
+            true => Err("--level by-speed is for `run` and `demo`: there is no hand here")
+                .or_hint("state a level such as --level 2, or leave the option out"),
+            false => Ok(()),
+        }
+    }
+
+    /// Logs that the level does not follow the hand's speed on a terrain with materials.
+    pub fn warn_if_level_is_kept(&self, has_materials: bool) {
+        if has_materials && self.is_level_by_speed() {
+            tracing::warn!("--level by-speed has no effect on a terrain with materials");
+        }
+    }
+
     /// Returns the scale of the options, with defaults.
     ///
     /// # Errors
@@ -109,7 +145,7 @@ impl Rendering {
     /// Positions cannot represent its heights or size, or the level is too high.
     pub fn terrain<'r>(&self, grid: HapticGrid<'r>, scale: Scale) -> Result<Terrain<'r>, Failure> {
         let holds = |level: &u8| grid.tip_mm() / scale.at_level(*level).cell_mm() <= MAX_TIP_CELLS;
-        let level = self.level.or_else(|| (0..31).find(holds));
+        let level = self.fixed_level().or_else(|| (0..31).find(holds));
         Ok(Terrain::over(grid, scale, level.unwrap_or(0))?)
     }
 }

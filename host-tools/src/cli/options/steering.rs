@@ -150,6 +150,7 @@ impl<'t> PlacementControl<'t> {
             resolution_mm: Reach::of(arm).resolution_mm(),
             level,
             tip_mm: terrain.grid().tip_mm(),
+            coarser: 0,
         };
         Self {
             steering: Steering::new(bounds, terrain.clone()),
@@ -160,6 +161,11 @@ impl<'t> PlacementControl<'t> {
             began: Instant::now(),
             entered: None,
         }
+    }
+
+    /// Changes the level by the hand's speed from now on, on a device with this tick rate.
+    pub(in crate::cli) fn follow_speed(&mut self, tick_hz: u32) {
+        self.steering.follow_speed(tick_hz);
     }
 
     /// Returns the number of the question that a command answered since the last call.

@@ -120,9 +120,12 @@ impl<'t> Serving<'_, 't> {
         };
         let mut control = PlacementControl::new(
             (placed.terrain, placed_surface),
-            (&placed.arm, args.rendering.level),
+            (&placed.arm, args.rendering.fixed_level()),
             self.commands,
         );
+        if args.rendering.is_level_by_speed() {
+            control.follow_speed(hello.tick_hz);
+        }
         // Before anything else reads the keyboard.
         match &self.device_keys {
             Some(device_keys) => control.use_keys(device_keys),

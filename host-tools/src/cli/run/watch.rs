@@ -17,6 +17,7 @@ use crate::cli::viewing::ViewerSession;
 use crate::events::{Event as Reported, Watcher};
 use crate::link::{Event, HostRequest, LinkStats};
 use crate::output::OutputError;
+use crate::place::PlacedSurface;
 use crate::replay::settings::PlacementSettings;
 use crate::replay::{LoopColumns, Record, Recording, Value, is_below_ground, state_name};
 use crate::serving::SessionHandler;
@@ -41,6 +42,8 @@ pub(super) struct Watch<'t> {
     failed: Option<OutputError>,
     /// Number of placements in the recording.
     described_view: usize,
+    /// The last of them, and the radius of its tip, mm.
+    described: (PlacedSurface, f64),
     control: PlacementControl<'t>,
     prompts: ArmingPrompts,
     line_due: Instant,
@@ -75,6 +78,10 @@ impl<'t> Watch<'t> {
             (None, Some(device_keys)) => (f64::MAX, ArmingPrompts::at(device_keys)),
             (None, None) => (f64::MAX, ArmingPrompts::at_terminal()),
         };
+        let placed_surface = PlacedSurface {
+            view: placed.view,
+            params: placed.scene.params,
+        };
         Self {
             log: SampleLog::new(placed.terrain, device),
             stop_s: args.duration.unwrap_or(f64::MAX).min(script_s),
@@ -83,6 +90,7 @@ impl<'t> Watch<'t> {
             recording,
             failed: None,
             described_view: 0,
+            described: (placed_surface, placed.terrain.grid().tip_mm()),
             control,
             prompts,
             line_due: Instant::now() + LINE_INTERVAL,
@@ -160,11 +168,15 @@ impl<'t> Watch<'t> {
             && let Some(placed_surface) = &placement.placed_surface
         {
             self.described_view = view;
-            self.device_console.notify(steering::placement_text(
-                view,
-                placed_surface,
-                &placement.terrain,
-            ));
+            let described = (*placed_surface, placement.terrain.grid().tip_mm());
+            let before = std::mem::replace(&mut self.described, described);
+            if !has_other_level_alone(&before, &described) {
+                self.device_console.notify(steering::placement_text(
+                    view,
+                    placed_surface,
+                    &placement.terrain,
+                ));
+            }
             if let Some(recording) = &mut self.recording {
                 let number = u32::try_from(view).unwrap_or(u32::MAX);
                 let settings = PlacementSettings::new(number, &placement.terrain, placed_surface);
@@ -264,6 +276,18 @@ impl<'t> SessionHandler<'t> for Watch<'t> {
     fn is_over(&self) -> bool {
         self.failed.is_some() || self.log.t_s() >= self.stop_s || self.is_stalled()
     }
+}
+
+/// Returns true if two placements, with the radius of the tip, differ only in place and level. The
+/// hand's speed makes such a change often, and the status line shows the level.
+fn has_other_level_alone(
+    (before, tip_before_mm): &(PlacedSurface, f64),
+    (after, tip_mm): &(PlacedSurface, f64),
+) -> bool {
+    before.view.level != after.view.level
+        && before.view.scale == after.view.scale
+        && before.params == after.params
+        && tip_before_mm == tip_mm
 }
 
 fn in_words(

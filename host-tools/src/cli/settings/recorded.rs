@@ -98,7 +98,7 @@ pub(in crate::cli) fn differences(
     };
     let scale = MapScale::CellMm(rendered.cell_mm);
     let stated_scale = rendering.scale.unwrap_or(scale);
-    let level = rendering.level.unwrap_or(rendered.level);
+    let level = rendering.fixed_level().unwrap_or(rendered.level);
     let tip_mm = rendering.tip.unwrap_or(rendered.tip_mm);
     let materials = recorded.materials.as_ref().map(|it| it.file.clone().into());
     let shown = |file: &Option<PathBuf>| {

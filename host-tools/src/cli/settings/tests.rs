@@ -7,6 +7,7 @@ use hapterra_core::force::{Shading, SurfaceParams};
 
 use super::*;
 use crate::cli::options::exaggeration::Exaggeration;
+use crate::cli::options::level::LevelChoice;
 use crate::cli::options::surface::{SurfaceChoice, SurfaceOptions};
 use crate::replay::settings::Device;
 use crate::replay::{Rule, Settings};
@@ -197,7 +198,10 @@ fn recording_options_are_those_of_the_recorded_run() {
     let rendering = &args.rendering;
     assert_eq!(rendering.scale, Some(MapScale::CellMm(2.0)));
     assert_eq!(rendering.exaggeration, Some(Exaggeration::MmPerUnit(6.0)));
-    assert_eq!((rendering.level, rendering.tip), (Some(1), Some(0.0)));
+    assert_eq!(
+        (rendering.level, rendering.tip),
+        (Some(LevelChoice::Fixed(1)), Some(0.0))
+    );
     let (args, _) = replayed("--ignore-settings");
     assert_eq!(args.rendering.scale, None);
 }

@@ -316,7 +316,7 @@ fn recording_rows_are_whole_ticks_apart() {
         (&[("0", 1.0), ("0.0015", 2.0)], 1000, "1.5 ticks after"),
         (&[("0", 1.0), ("0.001", 2.0)], 3000, ""),
         (&[("0", 1.0), ("0", 2.0)], 1000, "two places at 0 s"),
-        (&[("1", 1.0), ("0.9", 2.0)], 1000, "goes back"),
+        (&[("1", 1.0), ("0.9", 2.0)], 1000, "decreases"),
     ] {
         match recorded(rows, tick_hz) {
             Ok(ticks) => assert_eq!((ticks.len(), expected), (4, "")),
