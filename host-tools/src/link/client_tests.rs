@@ -924,6 +924,21 @@ fn changes_between_two_scenes_are_not_cancelled() {
     }
 }
 
+/// The device has lost the change; only its cancel restores the scene before.
+#[test]
+fn change_without_cancel_is_sent_again() {
+    on_bench(None, |bench| {
+        bench.open();
+        let before = bench.client.scene().epoch;
+        bench.accept_change(1, 6_001);
+        let cancel = Request::CancelChange { epoch: 5_001 };
+        bench.client.enqueue(HostRequest::Request(cancel));
+        bench.report_scene(before);
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (0, 6_001));
+        assert_eq!(count_of(&bench.drain_sent(), "Scene"), 1);
+    });
+}
+
 /// A device that reports the scene before has lost the one that it has rendered.
 #[test]
 fn rendered_change_is_not_cancelled() {
