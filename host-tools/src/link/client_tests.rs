@@ -985,6 +985,32 @@ fn request_of_the_user_does_not_wait_for_a_cancel() {
     });
 }
 
+/// A request of the user has replaced the cancel in the queue.
+#[test]
+fn tile_request_of_the_scene_before_reports_its_cancel() {
+    for is_cancelled in [true, false] {
+        on_bench(None, |bench| {
+            bench.open();
+            let (before, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
+            match is_cancelled {
+                true => bench.cancel_change(1),
+                false => bench.accept_change(1, 5_001),
+            }
+            let hold = ClutchMode::WithHand;
+            let clutch = HostRequest::Request(Request::Clutch { hold });
+            bench.client.enqueue(clutch);
+            bench.advance(ms(10)).expect("in time");
+            bench.out.clear();
+            bench.deliver(&ToHost::TileRequest { epoch: before, key });
+            let epoch = if is_cancelled { before } else { 5_001 };
+            let cancelled = usize::from(is_cancelled);
+            assert_eq!(bench.cancelled, u32::from(is_cancelled));
+            assert_eq!(bench.client.scene().epoch, epoch);
+            assert_eq!(count_of(&bench.drain_sent(), "Tile"), cancelled);
+        });
+    }
+}
+
 #[test]
 fn withheld_tiles_of_another_scene_are_not_sent() {
     on_bench(Some(Arming::VIRTUAL), |bench| {

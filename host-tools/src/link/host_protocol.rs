@@ -523,6 +523,13 @@ impl HostProtocol {
                 self.received = now;
                 Some(ProtocolEvent::Other(message))
             }
+            ToHost::TileRequest { epoch, .. } => {
+                // The device requests tiles of the scene before only after a cancel.
+                if self.state == State::Open {
+                    self.restore_reported_scene(Some(epoch));
+                }
+                Some(ProtocolEvent::Other(frame.message))
+            }
             message => Some(ProtocolEvent::Other(message)),
         })
     }
