@@ -20,9 +20,8 @@ const MAX_SAMPLES_SENT: u32 = 100;
 /// Samples between two attempts; twice as many after each further one that fails.
 const PAUSE_SAMPLES: u32 = 200;
 const MAX_PAUSE_SAMPLES: u32 = 6_400;
-/// Samples after which a cancel without a result is requested again. A refused one then counts as
-/// made, if the device still renders the placement before. Heartbeats, two a second, report the
-/// device's scene.
+/// Samples after which a cancel without a result is requested again. Heartbeats, two a second,
+/// report the device's scene.
 const MAX_SAMPLES_CANCELLING: u32 = 1_500;
 
 /// The rule, and the change that was sent, if any.
@@ -53,14 +52,7 @@ struct SentLevel<'r> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cancel {
     NotRequested,
-    Requested {
-        samples: u32,
-    },
-    /// The device has no such change: samples of the new placement arrive, or a heartbeat with the
-    /// scene before.
-    Refused {
-        samples: u32,
-    },
+    Requested { samples: u32 },
 }
 
 impl AutomaticLevel<'_> {
@@ -189,17 +181,13 @@ impl<'r> Steering<'r> {
         };
         let is_over = match &mut sent.cancel {
             Cancel::NotRequested => user_waits || is_late,
-            Cancel::Requested { samples } | Cancel::Refused { samples } => {
+            Cancel::Requested { samples } => {
                 *samples += 1;
                 *samples > MAX_SAMPLES_CANCELLING
             }
         };
-        match sent.cancel {
-            Cancel::Refused { .. } if is_over && sample.view == sent.before.2 => {
-                self.on_change_cancelled();
-            }
-            _ if is_over => self.request_cancel(),
-            _ => {}
+        if is_over {
+            self.request_cancel();
         }
     }
 
@@ -212,11 +200,12 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Handles the refusal of a cancel: a busy device gets another one.
+    /// Handles the refusal of a cancel: a busy device gets another one. One that has no such change
+    /// sends samples of the new placement, or reports the scene before.
     pub(super) fn on_refused_cancel(&mut self, epoch: u32, refusal: &Refusal) {
         if let Some(sent) = self.sent_level().filter(|sent| sent.epoch == epoch) {
             sent.cancel = match refusal {
-                Refusal::NoSuchChange => Cancel::Refused { samples: 0 },
+                Refusal::NoSuchChange => Cancel::Requested { samples: 0 },
                 _ => Cancel::NotRequested,
             };
         }

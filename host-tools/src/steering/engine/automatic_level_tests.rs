@@ -324,14 +324,18 @@ fn refused_cancel_has_an_end() {
     });
     // A device that has no such change, and still renders the placement before.
     sliding(|hand| {
-        hand.send_coarser();
+        let level = hand.send_coarser().scene.level;
         hand.slide(0.0, 101);
         assert!(hand.cancels());
-        hand.refuse_cancel(Refusal::NoSuchChange);
-        hand.slide(0.0, MAX_CANCEL_SAMPLES);
-        assert!(!hand.cancels());
-        assert_eq!((hand.level(), hand.steering.number), (0, 0));
-        assert!(matches!(hand.steering.stage, Stage::Idle));
+        for _ in 0..3 {
+            hand.refuse_cancel(Refusal::NoSuchChange);
+            hand.slide(0.0, MAX_CANCEL_SAMPLES);
+            assert!(hand.cancels());
+            assert_eq!((hand.level(), hand.steering.number), (level, 1));
+        }
+        hand.steering.steer(ZOOM);
+        hand.slide(0.0, 1);
+        assert_eq!(requested_hold(hand.steering), Some(ClutchMode::InPlace));
     });
     // A cancel whose answer never arrives, as after a request of the user, is requested again.
     sliding(|hand| {
