@@ -5,6 +5,7 @@
 //! open no clutch. If a change of the user still waits [`MAX_SAMPLES_IN_CONTACT`] samples after that
 //! of the level, the clutch opens for both.
 
+use glam::Vec3;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::{Refusal, Request};
@@ -101,7 +102,11 @@ impl<'r> Steering<'r> {
             return;
         };
         let ms = sample.tick.wrapping_sub(last.tick) / automatic.ticks_per_ms;
-        let moved_mm = last.hip.to(&sample.hip) * self.terrain.scale().cell_mm() as f32;
+        let moved_mm = match presses(&last) && presses(sample) {
+            true => last.hip.to(&sample.hip) * self.terrain.scale().cell_mm() as f32,
+            // Motion in the air is no motion over the ground.
+            false => Vec3::ZERO,
+        };
         let finest = self
             .bounds
             .finest_level(self.terrain.grid(), &self.now.view);
