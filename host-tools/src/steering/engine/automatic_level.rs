@@ -180,7 +180,9 @@ impl<'r> Steering<'r> {
         if self.held || (user_waits && samples > MAX_SAMPLES_IN_CONTACT) {
             return self.open_clutch();
         }
-        let is_late = samples > MAX_SAMPLES_SENT || !presses(sample);
+        // The link is behind the hand: the tiles of another placement would arrive even later.
+        let is_coarse = sample.limits.contains(Limits::TERRAIN_COARSE);
+        let is_late = samples > MAX_SAMPLES_SENT || is_coarse || !presses(sample);
         let Some(sent) = self.sent_level() else {
             return;
         };

@@ -167,20 +167,42 @@ fn hand_that_does_not_press_changes_no_level() {
     }
 }
 
-/// The hand lifts off, or the coarse tiles are late.
+/// A fast hand in the air, which lands and rests.
+#[test]
+fn landing_changes_no_level() {
+    sliding(|hand| {
+        hand.state = ContactState::Free;
+        (0..100).for_each(|_| assert_eq!(hand.move_on(), None));
+        hand.state = ContactState::Touching;
+        assert_eq!(hand.slide(0.0, SLOW_SAMPLES), None);
+        // A fast one on the ground, in the air.
+        let view = hand.slide_fast().expect("a coarser level");
+        report_result(hand.steering, &view, true);
+        hand.view = 1;
+        hand.slide(0.0, 1);
+        hand.state = ContactState::Free;
+        (0..SLOW_SAMPLES).for_each(|_| assert_eq!(hand.move_on(), None));
+        hand.state = ContactState::Touching;
+        assert_eq!(hand.slide(0.0, 1).expect("a finer level").scene.level, 0);
+    });
+}
+
+/// The hand lifts off or leaves the tiles that have arrived, or the coarse tiles are late.
 #[test]
 fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
-    for lifts in [true, false] {
+    let lifts = (ContactState::Free, Limits::empty());
+    let leaves = (ContactState::Touching, Limits::TERRAIN_COARSE);
+    let waits = (ContactState::Touching, Limits::empty());
+    for reason in [lifts, leaves, waits] {
         sliding(|hand| {
             hand.send_coarser();
-            if lifts {
-                hand.state = ContactState::Free;
-            } else {
+            if reason == waits {
                 hand.slide(0.0, 100);
                 assert!(!hand.cancels());
             }
+            (hand.state, hand.limits) = reason;
             hand.slide(0.0, 1);
-            assert!(hand.cancels(), "lifts: {lifts}");
+            assert!(hand.cancels(), "{reason:?}");
             // Only once, and again if the device does not answer.
             hand.slide(0.0, 20);
             assert!(!hand.cancels() && hand.steering.is_settled());
@@ -190,7 +212,7 @@ fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
             assert!(hand.cancels());
             hand.steering.on_event(&Event::ChangeCancelled);
             assert_eq!((hand.level(), hand.steering.number), (0, 0));
-            hand.state = ContactState::Touching;
+            (hand.state, hand.limits) = waits;
             hand.east_mm = 2.0;
             assert_eq!(hand.slide_fast(), None, "after a pause");
             assert_eq!(hand.slide(0.0, 180), None);
