@@ -18,7 +18,7 @@ use crate::terrain::Terrain;
 
 /// Samples after which a change that was sent is cancelled; a sample is a millisecond.
 const MAX_SAMPLES_SENT: u32 = 100;
-/// Samples between two attempts; twice as many after each further one that fails.
+/// Samples between two attempts; twice as many after each further one that fails without a lift-off.
 const PAUSE_SAMPLES: u32 = 200;
 const MAX_PAUSE_SAMPLES: u32 = 6_400;
 /// Samples after which a cancel without a result is requested again. Heartbeats, two a second,
@@ -47,6 +47,8 @@ struct SentLevel<'r> {
     /// Epoch of the new placement's scene.
     epoch: u32,
     cancel: Cancel,
+    /// The hand has lifted off before the cancel.
+    is_lifted: bool,
 }
 
 /// Progress of a cancel, with the samples since then.
@@ -57,10 +59,12 @@ enum Cancel {
 }
 
 impl AutomaticLevel<'_> {
-    /// Waits longer after each attempt that fails.
-    fn back_off(&mut self) {
+    /// Waits after an attempt that failed; longer after each one without a lift-off.
+    fn back_off(&mut self, is_lifted: bool) {
         self.pause = self.next_pause;
-        self.next_pause = (2 * self.next_pause).min(MAX_PAUSE_SAMPLES);
+        if !is_lifted {
+            self.next_pause = (2 * self.next_pause).min(MAX_PAUSE_SAMPLES);
+        }
     }
 }
 
@@ -149,6 +153,7 @@ impl<'r> Steering<'r> {
                 other_coarser: coarser,
                 epoch: update.view.scene.epoch,
                 cancel: Cancel::NotRequested,
+                is_lifted: false,
             });
         }
         if let Some(update) = update {
@@ -168,7 +173,7 @@ impl<'r> Steering<'r> {
         if let Some(sent) = automatic.sent.as_mut().filter(|_| accepted) {
             std::mem::swap(&mut self.bounds.coarser, &mut sent.other_coarser);
         } else if automatic.sent.take().is_some() {
-            automatic.back_off();
+            automatic.back_off(false);
         }
     }
 
@@ -187,7 +192,10 @@ impl<'r> Steering<'r> {
             return;
         };
         let is_over = match &mut sent.cancel {
-            Cancel::NotRequested => user_waits || is_late,
+            Cancel::NotRequested => {
+                sent.is_lifted |= !presses(sample);
+                user_waits || is_late
+            }
             Cancel::Requested { samples } => {
                 *samples += 1;
                 *samples > MAX_SAMPLES_CANCELLING
@@ -226,7 +234,7 @@ impl<'r> Steering<'r> {
         let Some(sent) = automatic.sent.take() else {
             return;
         };
-        automatic.back_off();
+        automatic.back_off(sent.is_lifted);
         (self.now, self.terrain, self.number) = sent.before;
         self.bounds.coarser = sent.other_coarser;
         if let Stage::InContact { .. } = self.stage {
