@@ -69,9 +69,11 @@ impl AutomaticLevel<'_> {
 }
 
 impl<'r> Steering<'r> {
-    /// Changes the level by the hand's speed from now on, on a device with this tick rate.
+    /// Changes the level by the hand's speed from now on, on a device with this tick rate. With
+    /// materials, the level stays: it cannot change in contact.
     pub fn follow_speed(&mut self, tick_hz: u32) {
-        self.automatic = Some(AutomaticLevel {
+        let has_materials = self.terrain.grid().materials().is_some();
+        self.automatic = (!has_materials).then(|| AutomaticLevel {
             rule: LevelBySpeed::default(),
             ticks_per_ms: (tick_hz / 1_000).max(1),
             last: None,
