@@ -441,6 +441,42 @@ fn pause_doubles_after_each_cancel_until_a_success() {
 }
 
 #[test]
+fn lift_off_does_not_double_the_pause() {
+    sliding(|hand| {
+        hand.send_coarser();
+        for _ in 0..4 {
+            hand.state = ContactState::Free;
+            hand.slide(0.0, 1);
+            assert!(hand.cancels());
+            hand.steering.on_event(&Event::ChangeCancelled);
+            hand.state = ContactState::Touching;
+            (1..200).for_each(|_| assert_eq!(hand.move_on(), None));
+            let view = hand.move_on().expect("a level after the pause");
+            report_result(hand.steering, &view, true);
+        }
+    });
+}
+
+#[test]
+fn changes_that_were_given_up_open_no_clutch() {
+    sliding(|hand| {
+        hand.slide(0.0, 1);
+        hand.steering.steer(ZOOM);
+        let zoom = hand.slide(0.0, 1).expect("the user's change");
+        assert!(zoom.in_contact.is_some());
+        let hold = ClutchMode::Released;
+        let unanswered = HostRequest::Request(Request::Clutch { hold });
+        hand.steering.on_event(&Event::Unanswered(&unanswered));
+        assert_eq!(hand.steering.lines().len(), 1);
+        assert_eq!(requested_hold(hand.steering), Some(hold));
+        report_result(hand.steering, &zoom, false);
+        assert_eq!(hand.slide(0.0, 20), None);
+        assert_eq!(requested_hold(hand.steering), None);
+        assert!(hand.steering.is_settled());
+    });
+}
+
+#[test]
 fn level_that_the_terrain_does_not_have_is_requested_once() {
     sliding(|hand| {
         // The level stays, whatever the speed requires.
