@@ -924,6 +924,21 @@ fn changes_between_two_scenes_are_not_cancelled() {
     }
 }
 
+/// The device has lost the change; only its cancel restores the scene before.
+#[test]
+fn change_without_cancel_is_sent_again() {
+    on_bench(None, |bench| {
+        bench.open();
+        let before = bench.client.scene().epoch;
+        bench.accept_change(1, 6_001);
+        let cancel = Request::CancelChange { epoch: 5_001 };
+        bench.client.enqueue(HostRequest::Request(cancel));
+        bench.report_scene(before);
+        assert_eq!((bench.cancelled, bench.client.scene().epoch), (0, 6_001));
+        assert_eq!(count_of(&bench.drain_sent(), "Scene"), 1);
+    });
+}
+
 /// A device that reports the scene before has lost the one that it has rendered.
 #[test]
 fn rendered_change_is_not_cancelled() {
@@ -968,6 +983,32 @@ fn request_of_the_user_does_not_wait_for_a_cancel() {
         );
         assert_eq!(bench.unanswered, []);
     });
+}
+
+/// A request of the user has replaced the cancel in the queue.
+#[test]
+fn tile_request_of_the_scene_before_reports_its_cancel() {
+    for is_cancelled in [true, false] {
+        on_bench(None, |bench| {
+            bench.open();
+            let (before, key) = (bench.client.scene().epoch, TileKey::new(0, 0, 0));
+            match is_cancelled {
+                true => bench.cancel_change(1),
+                false => bench.accept_change(1, 5_001),
+            }
+            let hold = ClutchMode::WithHand;
+            let clutch = HostRequest::Request(Request::Clutch { hold });
+            bench.client.enqueue(clutch);
+            bench.advance(ms(10)).expect("in time");
+            bench.out.clear();
+            bench.deliver(&ToHost::TileRequest { epoch: before, key });
+            let epoch = if is_cancelled { before } else { 5_001 };
+            let cancelled = usize::from(is_cancelled);
+            assert_eq!(bench.cancelled, u32::from(is_cancelled));
+            assert_eq!(bench.client.scene().epoch, epoch);
+            assert_eq!(count_of(&bench.drain_sent(), "Tile"), cancelled);
+        });
+    }
 }
 
 #[test]

@@ -54,6 +54,16 @@ pub(super) enum ProtocolEvent {
     Other(ToHost),
 }
 
+/// Change in contact that the device has accepted.
+#[derive(Clone, Copy, Debug)]
+struct ChangeInContact {
+    /// The scene before, which the device has again after a cancel.
+    before: Scene,
+    number: u8,
+    /// True if its cancel was requested.
+    is_cancelled: bool,
+}
+
 /// The host's side of a session with a device, with or without a scene.
 #[derive(Clone, Debug)]
 pub(super) struct HostProtocol {
@@ -71,9 +81,8 @@ pub(super) struct HostProtocol {
     materials: Option<MaterialTable>,
     /// The unanswered scene change, and the times when it was first and last sent.
     view: Option<(SceneChange, Duration, Duration)>,
-    /// The scene before a change in contact, which the device has again after a cancel, and the
-    /// change's number; until the change is rendered.
-    before: Option<(Scene, u8)>,
+    /// The latest change in contact, until it is rendered.
+    in_contact: Option<ChangeInContact>,
     /// True if the scene before a change was restored since the last call of
     /// [`HostProtocol::take_restored`].
     is_restored: bool,
@@ -110,7 +119,7 @@ impl HostProtocol {
             scene,
             materials: None,
             view: None,
-            before: None,
+            in_contact: None,
             is_restored: false,
             timeouts,
             state: State::Closed,
@@ -205,7 +214,7 @@ impl HostProtocol {
     /// Sends a scene change until it is answered; it replaces an unanswered one.
     pub(super) fn put_view(&mut self, view: SceneChange, now: Duration, out: &mut Vec<u8>) {
         self.view = Some((view, now, now));
-        self.before = None;
+        self.in_contact = None;
         self.requests.drop_cancels();
         if self.state == State::Open {
             self.append_message(&ToDevice::SceneChange(view), out);
@@ -244,20 +253,26 @@ impl HostProtocol {
         // Equal scenes have equal epochs: a report of the epoch then does not mean a cancel.
         let is_before =
             |before: &Scene| view.in_contact.is_some() && before.epoch != view.scene.epoch;
-        self.before = before.filter(is_before).map(|scene| (scene, view.number));
+        self.in_contact = before.filter(is_before).map(|before| ChangeInContact {
+            before,
+            number: view.number,
+            is_cancelled: false,
+        });
     }
 
     /// Records that the device renders the placement with this number. Returns true if it is that
     /// of the latest change, which can no longer be cancelled.
     pub(super) fn on_rendered(&mut self, number: u8) -> bool {
-        let change = self.before.take_if(|(_, change)| *change == number);
+        let change = self.in_contact.take_if(|change| change.number == number);
         change.is_some()
     }
 
-    /// Returns to the scene before the latest change if the device reports that scene's epoch.
+    /// Returns to the scene before the latest change if a cancel was requested and the device
+    /// reports that scene's epoch.
     fn restore_reported_scene(&mut self, epoch: Option<u32>) {
-        if let Some((before, _)) = &self.before
-            && epoch == Some(before.epoch)
+        if let Some(change) = &self.in_contact
+            && change.is_cancelled
+            && epoch == Some(change.before.epoch)
         {
             self.restore_scene();
         }
@@ -265,8 +280,8 @@ impl HostProtocol {
 
     /// Returns to the scene before the latest change.
     fn restore_scene(&mut self) {
-        if let Some((before, _)) = self.before.take() {
-            self.scene = Some(before);
+        if let Some(change) = self.in_contact.take() {
+            self.scene = Some(change.before);
             self.is_restored = true;
             self.requests.drop_cancels();
         }
@@ -289,6 +304,12 @@ impl HostProtocol {
 
     /// Adds a request after the earlier ones.
     pub(super) fn enqueue(&mut self, request: HostRequest) {
+        if let HostRequest::Request(Request::CancelChange { epoch }) = request
+            && self.scene.is_some_and(|scene| scene.epoch == epoch)
+            && let Some(change) = &mut self.in_contact
+        {
+            change.is_cancelled = true;
+        }
         self.requests.enqueue(request);
     }
 
@@ -501,6 +522,13 @@ impl HostProtocol {
             message @ ToHost::PointAnswer { .. } => {
                 self.received = now;
                 Some(ProtocolEvent::Other(message))
+            }
+            ToHost::TileRequest { epoch, .. } => {
+                // The device requests tiles of the scene before only after a cancel.
+                if self.state == State::Open {
+                    self.restore_reported_scene(Some(epoch));
+                }
+                Some(ProtocolEvent::Other(frame.message))
             }
             message => Some(ProtocolEvent::Other(message)),
         })

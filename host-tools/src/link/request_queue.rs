@@ -33,7 +33,7 @@ pub(super) struct RequestQueue {
 
 impl RequestQueue {
     /// Adds a request at the end of the queue. Cancels of a change give up their place to any other
-    /// request: heartbeats report their result.
+    /// request: heartbeats and tile requests report their result.
     pub(super) fn enqueue(&mut self, request: HostRequest) {
         if !is_cancel(&request) {
             self.drop_cancels();

@@ -83,7 +83,7 @@ enum Stage<'r> {
     /// This placement was sent; with its terrain. It changes in contact, or with an open clutch.
     Applying {
         next: Box<(PlacedSurface, Terrain<'r>)>,
-        /// The changes, if the placement changes in contact.
+        /// The changes, if the placement changes in contact; none for a change of the level.
         in_contact: Option<Vec<PlacementChange>>,
     },
     /// The device was sent a placement that changes in contact, and had rendered the one before in
@@ -250,8 +250,11 @@ impl<'r> Steering<'r> {
         self.lines.push(why.to_owned());
         self.waiting.clear();
         (self.held, self.must_measure) = (false, false);
-        if matches!(self.stage, Stage::Applying { .. }) {
-            // The answer to the change is still to arrive.
+        if let Stage::Applying { in_contact, .. } = &mut self.stage {
+            // The answer to the change is still to arrive. A refused one is not sent again.
+            if let Some(changes) = in_contact {
+                changes.clear();
+            }
             return self.request_clutch(ClutchMode::Released);
         }
         self.release_clutch();
@@ -580,7 +583,8 @@ impl<'r> Steering<'r> {
                     self.continue_clutch();
                 }
             }
-            Some(_) if self.changes_level() => {
+            // The level, or changes that were given up.
+            Some(changes) if changes.is_empty() => {
                 self.stage = Stage::Idle;
                 self.on_level_result(false);
                 self.continue_clutch();

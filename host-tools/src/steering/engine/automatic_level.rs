@@ -5,6 +5,7 @@
 //! open no clutch. If a change of the user still waits [`MAX_SAMPLES_IN_CONTACT`] samples after that
 //! of the level, the clutch opens for both.
 
+use glam::Vec3;
 use hapterra_core::guard::Limits;
 use hapterra_core::scene::TickRecord;
 use hapterra_core::wire::request::{Refusal, Request};
@@ -17,12 +18,11 @@ use crate::terrain::Terrain;
 
 /// Samples after which a change that was sent is cancelled; a sample is a millisecond.
 const MAX_SAMPLES_SENT: u32 = 100;
-/// Samples between two attempts; twice as many after each further one that fails.
+/// Samples between two attempts; twice as many after each further one that fails without a lift-off.
 const PAUSE_SAMPLES: u32 = 200;
 const MAX_PAUSE_SAMPLES: u32 = 6_400;
-/// Samples after which a cancel without a result is requested again. A refused one then counts as
-/// made, if the device still renders the placement before. Heartbeats, two a second, report the
-/// device's scene.
+/// Samples after which a cancel without a result is requested again. Heartbeats, two a second,
+/// report the device's scene.
 const MAX_SAMPLES_CANCELLING: u32 = 1_500;
 
 /// The rule, and the change that was sent, if any.
@@ -47,34 +47,33 @@ struct SentLevel<'r> {
     /// Epoch of the new placement's scene.
     epoch: u32,
     cancel: Cancel,
+    /// The hand has lifted off before the cancel.
+    is_lifted: bool,
 }
 
 /// Progress of a cancel, with the samples since then.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cancel {
     NotRequested,
-    Requested {
-        samples: u32,
-    },
-    /// The device has no such change: samples of the new placement arrive, or a heartbeat with the
-    /// scene before.
-    Refused {
-        samples: u32,
-    },
+    Requested { samples: u32 },
 }
 
 impl AutomaticLevel<'_> {
-    /// Waits longer after each attempt that fails.
-    fn back_off(&mut self) {
+    /// Waits after an attempt that failed; longer after each one without a lift-off.
+    fn back_off(&mut self, is_lifted: bool) {
         self.pause = self.next_pause;
-        self.next_pause = (2 * self.next_pause).min(MAX_PAUSE_SAMPLES);
+        if !is_lifted {
+            self.next_pause = (2 * self.next_pause).min(MAX_PAUSE_SAMPLES);
+        }
     }
 }
 
 impl<'r> Steering<'r> {
-    /// Changes the level by the hand's speed from now on, on a device with this tick rate.
+    /// Changes the level by the hand's speed from now on, on a device with this tick rate. With
+    /// materials, the level stays: it cannot change in contact.
     pub fn follow_speed(&mut self, tick_hz: u32) {
-        self.automatic = Some(AutomaticLevel {
+        let has_materials = self.terrain.grid().materials().is_some();
+        self.automatic = (!has_materials).then(|| AutomaticLevel {
             rule: LevelBySpeed::default(),
             ticks_per_ms: (tick_hz / 1_000).max(1),
             last: None,
@@ -109,7 +108,11 @@ impl<'r> Steering<'r> {
             return;
         };
         let ms = sample.tick.wrapping_sub(last.tick) / automatic.ticks_per_ms;
-        let moved_mm = last.hip.to(&sample.hip) * self.terrain.scale().cell_mm() as f32;
+        let moved_mm = match presses(&last) && presses(sample) {
+            true => last.hip.to(&sample.hip) * self.terrain.scale().cell_mm() as f32,
+            // Motion in the air is no motion over the ground.
+            false => Vec3::ZERO,
+        };
         let finest = self
             .bounds
             .finest_level(self.terrain.grid(), &self.now.view);
@@ -152,6 +155,7 @@ impl<'r> Steering<'r> {
                 other_coarser: coarser,
                 epoch: update.view.scene.epoch,
                 cancel: Cancel::NotRequested,
+                is_lifted: false,
             });
         }
         if let Some(update) = update {
@@ -171,7 +175,7 @@ impl<'r> Steering<'r> {
         if let Some(sent) = automatic.sent.as_mut().filter(|_| accepted) {
             std::mem::swap(&mut self.bounds.coarser, &mut sent.other_coarser);
         } else if automatic.sent.take().is_some() {
-            automatic.back_off();
+            automatic.back_off(false);
         }
     }
 
@@ -183,23 +187,24 @@ impl<'r> Steering<'r> {
         if self.held || (user_waits && samples > MAX_SAMPLES_IN_CONTACT) {
             return self.open_clutch();
         }
-        let is_late = samples > MAX_SAMPLES_SENT || !presses(sample);
+        // The link is behind the hand: the tiles of another placement would arrive even later.
+        let is_coarse = sample.limits.contains(Limits::TERRAIN_COARSE);
+        let is_late = samples > MAX_SAMPLES_SENT || is_coarse || !presses(sample);
         let Some(sent) = self.sent_level() else {
             return;
         };
         let is_over = match &mut sent.cancel {
-            Cancel::NotRequested => user_waits || is_late,
-            Cancel::Requested { samples } | Cancel::Refused { samples } => {
+            Cancel::NotRequested => {
+                sent.is_lifted |= !presses(sample);
+                user_waits || is_late
+            }
+            Cancel::Requested { samples } => {
                 *samples += 1;
                 *samples > MAX_SAMPLES_CANCELLING
             }
         };
-        match sent.cancel {
-            Cancel::Refused { .. } if is_over && sample.view == sent.before.2 => {
-                self.on_change_cancelled();
-            }
-            _ if is_over => self.request_cancel(),
-            _ => {}
+        if is_over {
+            self.request_cancel();
         }
     }
 
@@ -212,11 +217,12 @@ impl<'r> Steering<'r> {
         }
     }
 
-    /// Handles the refusal of a cancel: a busy device gets another one.
+    /// Handles the refusal of a cancel: a busy device gets another one. One that has no such change
+    /// sends samples of the new placement, or reports the scene before.
     pub(super) fn on_refused_cancel(&mut self, epoch: u32, refusal: &Refusal) {
         if let Some(sent) = self.sent_level().filter(|sent| sent.epoch == epoch) {
             sent.cancel = match refusal {
-                Refusal::NoSuchChange => Cancel::Refused { samples: 0 },
+                Refusal::NoSuchChange => Cancel::Requested { samples: 0 },
                 _ => Cancel::NotRequested,
             };
         }
@@ -230,7 +236,7 @@ impl<'r> Steering<'r> {
         let Some(sent) = automatic.sent.take() else {
             return;
         };
-        automatic.back_off();
+        automatic.back_off(sent.is_lifted);
         (self.now, self.terrain, self.number) = sent.before;
         self.bounds.coarser = sent.other_coarser;
         if let Stage::InContact { .. } = self.stage {

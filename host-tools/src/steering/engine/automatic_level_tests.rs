@@ -158,27 +158,51 @@ fn hand_that_does_not_press_changes_no_level() {
             (hand.state, hand.limits) = (state, limits);
             assert_eq!(hand.slide_fast(), None);
             assert!(!hand.cancels());
-            // At once when it presses.
+            // Motion in the air is no motion over the ground.
+            let is_at_once = state == ContactState::Touching;
             (hand.state, hand.limits) = (ContactState::Touching, Limits::empty());
-            assert!(hand.slide(-5.0, 1).is_some());
+            assert_eq!(hand.slide(-5.0, 1).is_some(), is_at_once);
+            assert!(is_at_once || hand.slide(-5.0, 10).is_some());
         });
     }
 }
 
-/// The hand lifts off, or the coarse tiles are late.
+/// A fast hand in the air, which lands and rests.
+#[test]
+fn landing_changes_no_level() {
+    sliding(|hand| {
+        hand.state = ContactState::Free;
+        (0..100).for_each(|_| assert_eq!(hand.move_on(), None));
+        hand.state = ContactState::Touching;
+        assert_eq!(hand.slide(0.0, SLOW_SAMPLES), None);
+        // A fast one on the ground, in the air.
+        let view = hand.slide_fast().expect("a coarser level");
+        report_result(hand.steering, &view, true);
+        hand.view = 1;
+        hand.slide(0.0, 1);
+        hand.state = ContactState::Free;
+        (0..SLOW_SAMPLES).for_each(|_| assert_eq!(hand.move_on(), None));
+        hand.state = ContactState::Touching;
+        assert_eq!(hand.slide(0.0, 1).expect("a finer level").scene.level, 0);
+    });
+}
+
+/// The hand lifts off or leaves the tiles that have arrived, or the coarse tiles are late.
 #[test]
 fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
-    for lifts in [true, false] {
+    let lifts = (ContactState::Free, Limits::empty());
+    let leaves = (ContactState::Touching, Limits::TERRAIN_COARSE);
+    let waits = (ContactState::Touching, Limits::empty());
+    for reason in [lifts, leaves, waits] {
         sliding(|hand| {
             hand.send_coarser();
-            if lifts {
-                hand.state = ContactState::Free;
-            } else {
+            if reason == waits {
                 hand.slide(0.0, 100);
                 assert!(!hand.cancels());
             }
+            (hand.state, hand.limits) = reason;
             hand.slide(0.0, 1);
-            assert!(hand.cancels(), "lifts: {lifts}");
+            assert!(hand.cancels(), "{reason:?}");
             // Only once, and again if the device does not answer.
             hand.slide(0.0, 20);
             assert!(!hand.cancels() && hand.steering.is_settled());
@@ -188,7 +212,7 @@ fn level_that_cannot_be_made_is_cancelled_and_sent_later() {
             assert!(hand.cancels());
             hand.steering.on_event(&Event::ChangeCancelled);
             assert_eq!((hand.level(), hand.steering.number), (0, 0));
-            hand.state = ContactState::Touching;
+            (hand.state, hand.limits) = waits;
             hand.east_mm = 2.0;
             assert_eq!(hand.slide_fast(), None, "after a pause");
             assert_eq!(hand.slide(0.0, 180), None);
@@ -324,14 +348,18 @@ fn refused_cancel_has_an_end() {
     });
     // A device that has no such change, and still renders the placement before.
     sliding(|hand| {
-        hand.send_coarser();
+        let level = hand.send_coarser().scene.level;
         hand.slide(0.0, 101);
         assert!(hand.cancels());
-        hand.refuse_cancel(Refusal::NoSuchChange);
-        hand.slide(0.0, MAX_CANCEL_SAMPLES);
-        assert!(!hand.cancels());
-        assert_eq!((hand.level(), hand.steering.number), (0, 0));
-        assert!(matches!(hand.steering.stage, Stage::Idle));
+        for _ in 0..3 {
+            hand.refuse_cancel(Refusal::NoSuchChange);
+            hand.slide(0.0, MAX_CANCEL_SAMPLES);
+            assert!(hand.cancels());
+            assert_eq!((hand.level(), hand.steering.number), (level, 1));
+        }
+        hand.steering.steer(ZOOM);
+        hand.slide(0.0, 1);
+        assert_eq!(requested_hold(hand.steering), Some(ClutchMode::InPlace));
     });
     // A cancel whose answer never arrives, as after a request of the user, is requested again.
     sliding(|hand| {
@@ -409,6 +437,42 @@ fn pause_doubles_after_each_cancel_until_a_success() {
         hand.steering.on_event(&Event::ChangeCancelled);
         assert_eq!(hand.slide(0.0, 199), None);
         assert!(hand.slide(0.0, 1).is_some());
+    });
+}
+
+#[test]
+fn lift_off_does_not_double_the_pause() {
+    sliding(|hand| {
+        hand.send_coarser();
+        for _ in 0..4 {
+            hand.state = ContactState::Free;
+            hand.slide(0.0, 1);
+            assert!(hand.cancels());
+            hand.steering.on_event(&Event::ChangeCancelled);
+            hand.state = ContactState::Touching;
+            (1..200).for_each(|_| assert_eq!(hand.move_on(), None));
+            let view = hand.move_on().expect("a level after the pause");
+            report_result(hand.steering, &view, true);
+        }
+    });
+}
+
+#[test]
+fn changes_that_were_given_up_open_no_clutch() {
+    sliding(|hand| {
+        hand.slide(0.0, 1);
+        hand.steering.steer(ZOOM);
+        let zoom = hand.slide(0.0, 1).expect("the user's change");
+        assert!(zoom.in_contact.is_some());
+        let hold = ClutchMode::Released;
+        let unanswered = HostRequest::Request(Request::Clutch { hold });
+        hand.steering.on_event(&Event::Unanswered(&unanswered));
+        assert_eq!(hand.steering.lines().len(), 1);
+        assert_eq!(requested_hold(hand.steering), Some(hold));
+        report_result(hand.steering, &zoom, false);
+        assert_eq!(hand.slide(0.0, 20), None);
+        assert_eq!(requested_hold(hand.steering), None);
+        assert!(hand.steering.is_settled());
     });
 }
 
