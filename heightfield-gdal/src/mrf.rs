@@ -39,7 +39,7 @@ pub(crate) fn check(library: &Libgdal, header: &str) -> Result<Result<(), String
         let leaves_folder = is_any_of(&NEIGHBOUR_KEYS) && !is_neighbour(name);
         if leaves_folder || is_any_of(&[COPIED_KEY]) {
             return Ok(Err(format!(
-                "it names {name}, which may be in another folder: get both files, and open the MRF here"
+                "it names {name}, which may not be beside it: get both files, and open the MRF here"
             )));
         }
     }
