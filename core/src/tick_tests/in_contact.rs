@@ -265,13 +265,16 @@ fn surface_mm(arm: &PressedArm<'_>, at: &GridPoint) -> f32 {
     (corners.base as f32 + height) * arm.device.haptics.scene.expect("a scene").cell_mm
 }
 
+/// Heights of a field, cells, by column and row.
+type Heights = fn(i32, i32) -> f32;
+
 /// A zoom to a fallback that is 2 mm too high, or 1 mm too low: the surface under the hand moves by
 /// that distance as its tiles arrive.
 #[test]
 fn surface_under_the_hand_blends_at_the_documented_speed() {
     let max_mm = DOCUMENTED_BLEND_MM_S / 1_000.0;
     // Cells of the new placement: of the same ground, finer and of 1 mm, or the same and larger.
-    let zooms: [(i32, f32, fn(i32, i32) -> f32); 4] = [
+    let zooms: [(i32, f32, Heights); 4] = [
         (1, 1.0, finer),
         (-1, 1.0, coarser),
         (0, 2.0, ground),
