@@ -261,7 +261,7 @@ impl Heights for Part {
         match raster.check_complete() {
             Err(error) => *why = text(&error.into()),
             Ok(()) if why.is_empty() => {
-                *why = "the heights have not arrived yet: try again".to_owned()
+                *why = "the heights have not arrived yet: try again".to_owned();
             }
             Ok(()) => {}
         }
